@@ -77,11 +77,11 @@ def _row(listed: ListedRobot, now_ns: int) -> RosterRow:
     )
 
 
-def roster_table(rows: RosterRows) -> RenderableType:
-    """One line a robot, and below what needs words."""
+def roster_table(rows: RosterRows, missing: str = "") -> RenderableType:
+    """One line a robot, and below what needs words. `missing`: why the list may lack robots."""
     table = plain_table("robot", "guard", "operator", "waits", "faults", "profile", "place")
     table.columns[-1].no_wrap, table.columns[-1].overflow = False, "fold"
-    notes: list[Text] = []
+    notes = [Text(missing, "bold red")] if missing else []
     for row in rows.robots:
         _add(table, row)
         if row.waits_s is not None:
@@ -97,7 +97,8 @@ def roster_table(rows: RosterRows) -> RenderableType:
             notes.append(Text(f"{row.robot}: {row.operator} offers it to {row.offered_to}", "yellow"))
     there = ", ".join(rows.operators) or "none"
     waiting = sum(row.waits_s is not None for row in rows.robots)
-    count = f"{len(rows.robots)} robots, {waiting} waiting; operators here: {there}"
+    robots = "1 robot" if len(rows.robots) == 1 else f"{len(rows.robots)} robots"
+    count = f"{robots}, {waiting} waiting; operators here: {there}"
     return Group(table, *notes, Text(count, "dim"))
 
 

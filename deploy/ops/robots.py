@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +14,7 @@ from rich.console import Console
 from rich.live import Live
 
 from common.clock import monotonic_ns
+from common.errors import TandemError
 from common.link import open_session
 from common.link.config import LinkConfig
 from common.link.roster import Roster
@@ -61,10 +64,21 @@ async def _list(link: LinkConfig, roster: Roster, stop: asyncio.Event, *, once: 
                 typer.echo(json.dumps(to_tree(rows), indent=2, ensure_ascii=False))
             else:
                 Console().print(roster_table(rows))
+            if missing := unreached(link, session.peers):
+                raise TandemError(missing)
         elif as_json:
             await _lines(roster, stop)
         else:
-            await _live(roster, stop)
+            await _live(roster, stop, lambda: unreached(link, session.peers))
+
+
+def unreached(link: LinkConfig, peers: int) -> str:
+    """Which ends do not answer, in words: robots behind them are not listed. Empty where all do."""
+    doors = 1 if link.mode == "client" else len(link.connect)
+    if peers >= doors:
+        return ""
+    which = "nobody answers" if not peers else f"{doors - peers} of {doors} endpoints do not answer"
+    return f"{which} at {', '.join(link.connect)}: robots there are not listed"
 
 
 async def _lines(roster: Roster, stop: asyncio.Event) -> None:
@@ -79,18 +93,15 @@ async def _lines(roster: Roster, stop: asyncio.Event) -> None:
 
 
 def _without_times(rows: RosterRows) -> str:
-    """What a change of is worth a line: not that a second has passed."""
-    tree = [
-        (row.robot, row.guard, row.operator, row.waits_s is None, row.faults, row.namesakes)
-        for row in rows.robots
-    ]
+    """What a change of is worth a line: not that a second has passed, which a reason may count."""
+    tree = [replace(row, waits_s=None if row.waits_s is None else 0.0, reason="") for row in rows.robots]
     return repr((tree, rows.operators))
 
 
-async def _live(roster: Roster, stop: asyncio.Event) -> None:
-    with Live(roster_table(roster_rows(roster, monotonic_ns())), auto_refresh=False, screen=False) as live:
+async def _live(roster: Roster, stop: asyncio.Event, missing: Callable[[], str]) -> None:
+    with Live(auto_refresh=False, screen=False) as live:
         while not stop.is_set():
-            live.update(roster_table(roster_rows(roster, monotonic_ns())), refresh=True)
+            live.update(roster_table(roster_rows(roster, monotonic_ns()), missing()), refresh=True)
             await _pause(stop, REDRAWN_S)
 
 

@@ -10,6 +10,7 @@ from slave.guard.admit import revocation
 from slave.guard.challenge import Challenges
 from slave.guard.engage import holder_only
 from slave.guard.guard import Guard
+from slave.guard.lease import WANTED_S
 
 
 class Control:
@@ -55,7 +56,7 @@ class Control:
                 why = self._late(request, now_ns) or _not_free(guard, operator)
                 if why is None and guard.operator != operator:
                     guard.lease.want(operator, now_ns)
-                done = f"the master of {operator} may claim it; then {operator} engages"
+                done = f"a master of {operator} that watches it claims it within {WANTED_S:g} s; then engage"
                 if guard.operator == operator:
                     done = f"{operator} commands it already"
             case Action.DISENGAGE:

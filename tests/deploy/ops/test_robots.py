@@ -1,0 +1,49 @@
+"""`tandem robots` says why its list may lack robots, and tells every change but the passing of time."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+from common.link.config import LinkConfig
+from deploy.cli import app
+from deploy.client.roster_view import RosterRow, RosterRows
+from deploy.ops.robots import _without_times, unreached
+from tests.common.link.test_link import free_endpoint
+
+
+def row(**changed: object) -> RosterRows:
+    fields: dict[str, object] = {
+        "robot": "a", "place": "", "software": "", "schema": 5, "profile": "", "guard": "hold", "reason": "",
+        "operator": "", "offered_to": "", "faults": 0, "waits_s": None, "words": "", "namesakes": 0,
+        **changed,
+    }  # fmt: skip
+    return RosterRows([RosterRow(**fields)], [])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "changed", [{"guard": "track"}, {"operator": "anna"}, {"offered_to": "ben"}, {"faults": 1},
+                {"waits_s": 1.0}, {"words": "help"}, {"namesakes": 1}, {"place": "elsewhere"}],
+)  # fmt: skip
+def test_each_change_is_worth_a_line(changed: dict[str, object]) -> None:
+    assert _without_times(row(**changed)) != _without_times(row())
+
+
+def test_time_that_passes_is_worth_none() -> None:
+    before, after = row(waits_s=0.0, reason="for 0 s"), row(waits_s=2.0, reason="for 2 s")
+    assert _without_times(before) == _without_times(after)
+
+
+def test_ends_that_do_not_answer_are_named() -> None:
+    ends = ["tcp/10.0.0.1:7447", "tcp/10.0.0.2:7447"]
+    assert unreached(LinkConfig(connect=ends), 2) == ""
+    assert unreached(LinkConfig(connect=ends, mode="client"), 1) == "", "one router leads to every robot"
+    assert unreached(LinkConfig(connect=ends), 1).startswith("1 of 2 endpoints do not answer")
+    assert unreached(LinkConfig(connect=ends[:1]), 0).startswith("nobody answers at tcp/10.0.0.1:7447")
+
+
+def test_an_empty_list_of_an_end_where_nobody_is_fails() -> None:
+    end = free_endpoint()
+    done = CliRunner().invoke(app, ["robots", "--connect", end, "--once"])
+    assert done.exit_code != 0
+    assert "nobody answers" in str(done.exception) + done.output
