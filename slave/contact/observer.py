@@ -73,7 +73,12 @@ class MomentumObserver:
     @property
     def ready(self) -> bool:
         """Whether no estimate depends any more on how it began."""
-        return self._known_s > SETTLED * self._time_constants_s[-1]
+        return self.settled == len(self._time_constants_s)
+
+    @property
+    def settled(self) -> int:
+        """Of how many time constants that is so: the shortest ones come first."""
+        return sum(self._known_s > SETTLED * each for each in self._time_constants_s)
 
     @property
     def residuals_nm(self) -> Array:

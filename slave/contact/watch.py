@@ -150,16 +150,20 @@ class ContactWatch:
         self.observer.update(
             reading.read_ns, angle_rad, effort, to_s(reading.stamp_error_ns), self._foretold.sudden_nm
         )
-        if not self.observer.ready:
+        settled = self.observer.settled
+        if not settled:
             return
-        self._ready_ns = now_ns
-        shares = np.abs(self.observer.residuals_nm) / self._thresholds_nm
+        ready = self.observer.ready
+        if ready:
+            self._ready_ns = now_ns
+        # a hard push is noticed before the longer time constants have settled
+        shares = (np.abs(self.observer.residuals_nm) / self._thresholds_nm)[:settled]
         self.share = share = np.where(self._told, shares.max(axis=0), 0.0)
         pushed = share > 1.0
         if pushed.any():
             self.count += self.finding is None
             self.finding = self._describe(pushed)
-        elif self.finding is not None and (share < RELEASE).all():
+        elif self.finding is not None and ready and (share < RELEASE).all():
             self.finding = None
 
     def wrote(self, dt_s: float, stand_rad: Array, setpoint_rad: Array) -> tuple[Array, Array]:
@@ -189,7 +193,7 @@ class ContactWatch:
         """The outermost joint that is pushed, its torque, and the least force that makes it."""
         j = max(np.flatnonzero(pushed).tolist(), key=lambda joint: self._depth[joint])
         joint = self._skeleton.joints[j]
-        torque_nm = float(np.abs(self.observer.residuals_nm[:, j]).max())
+        torque_nm = float(np.abs(self.observer.residuals_nm[: self.observer.settled, j]).max())
         model = self.observer.model
         segment = model.body(model.jnt_bodyid[self._hinge_ids[j]]).name
         force_n = torque_nm / self._lever_m(int(self._hinge_ids[j]))

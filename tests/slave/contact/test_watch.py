@@ -139,6 +139,25 @@ def test_one_angle_that_leaps_is_left_out() -> None:
     assert robot.watch.observer.ready
 
 
+def test_after_a_gap_a_hard_push_is_noticed_before_the_longer_time_constant_has_settled() -> None:
+    robot = Standing()
+    robot.now_ns += 30_000_000
+    robot.run(32, push(4.0, robot.watch))
+    assert not robot.watch.observer.ready
+    assert robot.watch.finding is not None
+
+
+def test_after_a_gap_a_contact_lasts_until_every_time_constant_has_settled() -> None:
+    robot = Standing()
+    robot.run(200, push(1.5, robot.watch))
+    robot.now_ns += 30_000_000
+    robot.run(40)
+    assert robot.watch.observer.settled == 1
+    assert robot.watch.finding is not None
+    robot.run(40)
+    assert robot.watch.finding is None
+
+
 def test_angles_that_stay_away_are_no_detection() -> None:
     robot = Standing()
     for _ in range(150):
