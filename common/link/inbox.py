@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 from collections import deque
 from collections.abc import Callable
 
@@ -44,6 +45,8 @@ class Inbox:
         self._counters = counters
         self._mailbox: Mailbox[tuple[bytes, int]] = Mailbox(most_keys)
         self._firsts = FirstArrivals(behind)
+        self._taking = threading.Lock()
+        """Two paths call in two threads: between "newer" and the mailbox no newer one may slip in."""
         self._throttle = LogThrottle()
         self._closed = False
 
@@ -52,11 +55,12 @@ class Inbox:
         arrived_ns = monotonic_ns()
         if self._closed:
             return
-        if not self._is_first(sample):
-            return
-        if self._mailbox.put(str(sample.key_expr), (sample.payload.to_bytes(), arrived_ns)):
-            wake(self._loop, self._deliver)
-        self._counters.received += 1
+        with self._taking:
+            if not self._is_first(sample):
+                return
+            if self._mailbox.put(str(sample.key_expr), (sample.payload.to_bytes(), arrived_ns)):
+                wake(self._loop, self._deliver)
+            self._counters.received += 1
 
     def _is_first(self, sample: zenoh.Sample) -> bool:
         attachment = sample.attachment
@@ -109,11 +113,14 @@ class OrderedInbox(Inbox):
     def on_sample(self, sample: zenoh.Sample) -> None:
         """Called in Zenoh's thread."""
         arrived_ns = monotonic_ns()
-        if self._closed or not self._is_first(sample):
+        if self._closed:
             return
-        self._counters.overwritten += len(self._waiting) == self._waiting.maxlen
-        self._waiting.append((str(sample.key_expr), sample.payload.to_bytes(), arrived_ns))
-        self._counters.received += 1
+        with self._taking:
+            if not self._is_first(sample):
+                return
+            self._counters.overwritten += len(self._waiting) == self._waiting.maxlen
+            self._waiting.append((str(sample.key_expr), sample.payload.to_bytes(), arrived_ns))
+            self._counters.received += 1
         wake(self._loop, self._deliver)
 
     def _deliver(self) -> None:

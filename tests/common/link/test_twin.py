@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
@@ -15,8 +16,10 @@ from hypothesis import strategies as st
 
 from common.link import Link, open_session
 from common.link.config import LinkConfig, TwinConfig
+from common.link.inbox import Inbox
 from common.link.twin import NUMBER, FirstArrivals, TwinQuestions
 from common.link.twin_session import TwinTokens
+from common.metrics.link import TopicCounters
 from common.wire.topics import COMMAND, CONTROL, IN_ORDER, STATE, VIDEO
 from deploy.harness.endpoints import free_port
 from tests.tcp_path import TcpPath
@@ -266,3 +269,39 @@ def test_a_token_is_there_while_a_path_shows_it_however_often_each_tells(
         tokens.on_sample(path, Sample(alive))  # type: ignore[arg-type]
         assert (said[-1] if said else False) == any(shown)
     assert all(one != next_one for one, next_one in pairwise(said))
+
+
+class Came:
+    """Stands for a zenoh.Sample."""
+
+    key_expr = "tandem/robot-1/state"
+
+    def __init__(self, number: int) -> None:
+        self.payload, self.attachment = Said(str(number).encode()), Said(NUMBER.pack(7, number))
+
+
+def test_an_older_message_of_one_path_never_replaces_a_newer_one_of_the_other() -> None:
+    """The two sessions call in two threads: between "it is newer" and the mailbox the other may come."""
+
+    class Slow(FirstArrivals):
+        def is_first(self, key: str, attachment: bytes | None) -> bool:
+            first = super().is_first(key, attachment)
+            if attachment == NUMBER.pack(7, 5):
+                other.start()
+                other.join(0.1)
+            return first
+
+    async def story() -> None:
+        await asyncio.sleep(0.0)
+        inbox._deliver()
+
+    heard: list[bytes] = []
+    loop = asyncio.new_event_loop()
+    inbox = Inbox("key", lambda key, payload, at_ns: heard.append(payload), loop, TopicCounters())
+    inbox._firsts = Slow()
+    other = threading.Thread(target=inbox.on_sample, args=(Came(6),))
+    inbox.on_sample(Came(5))  # type: ignore[arg-type]
+    other.join()
+    loop.run_until_complete(story())
+    loop.close()
+    assert heard[-1] == b"6"
