@@ -50,7 +50,7 @@ def roster_rows(roster: Roster, now_ns: int) -> RosterRows:
     """The list now: who waits comes first, the longest first; then by name."""
     rows = [_row(listed, now_ns) for listed in roster.robots()]
     rows.sort(key=lambda row: (row.waits_s is None, -(row.waits_s or 0.0), row.robot))
-    return RosterRows(rows, sorted(roster.operators))
+    return RosterRows(rows, sorted(map(printable, roster.operators)))
 
 
 def _row(listed: ListedRobot, now_ns: int) -> RosterRow:
@@ -62,19 +62,24 @@ def _row(listed: ListedRobot, now_ns: int) -> RosterRow:
     reason = f"{len(shown)} robots have this name" if several else "alive, but it tells nothing of itself"
     return RosterRow(
         robot=listed.robot,
-        place=" and ".join(sorted(each.words for each in shown)) if several else newest.place,
-        software=newest.software,
+        place=printable(" and ".join(sorted(each.words for each in shown)) if several else newest.place),
+        software=printable(newest.software),
         schema=newest.schema,
-        profile=newest.profile,
-        guard=summary.guard if summary else None,
-        reason=summary.reason if summary else reason,
-        operator=summary.operator if summary else "",
-        offered_to=summary.offered_to if summary else "",
+        profile=printable(newest.profile),
+        guard=printable(summary.guard) if summary else None,
+        reason=printable(summary.reason if summary else reason),
+        operator=printable(summary.operator if summary else ""),
+        offered_to=printable(summary.offered_to if summary else ""),
         faults=summary.faults if summary else None,
         waits_s=None if waits_s is None else round(waits_s, 1),
-        words=summary.call.words if summary and summary.call else "",
+        words=printable(summary.call.words if summary and summary.call else ""),
         namesakes=several,
     )
+
+
+def printable(words: str) -> str:
+    """Words from elsewhere, without what a terminal would obey: whoever calls an operator chooses them."""
+    return "".join(each if each.isprintable() else " " for each in words)
 
 
 def roster_table(rows: RosterRows, missing: str = "") -> RenderableType:
