@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 SMOOTH_S = 0.06
 MOST = 3000
@@ -60,9 +61,15 @@ def shared_joint(first: tuple[Array, Array], second: tuple[Array, Array], rate_h
 
 
 def _levers(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> tuple[Array, Array]:
-    """Accelerations (T, 3), and the matrices Γ (T, 3, 3) of the smoothed rates."""
+    """Accelerations (T, 3), NaN near what is missing, and the matrices Γ (T, 3, 3) of the smoothed rates."""
     width = max(3, round(SMOOTH_S * rate_hz))
-    acc, gyr = (uniform_filter1d(values, width, axis=0) for values in (acc_m_s2, gyr_rad_s))
+    missing: Mask = np.asarray(~np.isfinite(np.hstack([acc_m_s2, gyr_rad_s])).all(axis=1))
+    # a running mean never forgets a NaN: it would take all that follows with it
+    acc, gyr = (
+        uniform_filter1d(np.where(missing[:, None], 0.0, values), width, axis=0)
+        for values in (acc_m_s2, gyr_rad_s)
+    )
+    acc[maximum_filter1d(missing, width + 2)] = np.nan  # the slope takes one more on each side
     turning = np.gradient(gyr, 1.0 / rate_hz, axis=0)
     squared = np.einsum("ti,tj->tij", gyr, gyr) - np.eye(3) * (gyr**2).sum(axis=1)[:, None, None]
     x, y, z = turning.T

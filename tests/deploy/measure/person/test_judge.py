@@ -13,6 +13,7 @@ import pytest
 
 from common.recording.node import NodeRecording
 from deploy.measure.person.axes import axis_scales
+from deploy.measure.person.joints import shared_joint
 from deploy.measure.person.judge import PersonJudgement, judge_person
 from deploy.measure.person.steps import STEP_S, STEPS, expected
 from tests.deploy.measure.person.led import PARENTS, RATE_HZ, led_person
@@ -195,6 +196,11 @@ def test_a_real_person_who_was_not_led_is_accepted() -> None:
         assert "forearm_left" in {one.node for one in found}, "xyz"[axis]
     crossed = {**nodes, "forearm_left": nodes["hand_right"], "hand_right": arm}
     assert {one.what for one in judge_person(crossed, BODY, led=False).findings} >= {"apart"}
+    for name, node in crossed.items():
+        (acc := node.acc_m_s2.copy())[100] = np.nan
+        crossed[name] = replace(node, acc_m_s2=acc)
+    lossy = judge_person(crossed, BODY, led=False).findings
+    assert {one.what for one in lossy} >= {"apart"}, "one answer that was lost hides nothing"
 
 
 @needs_data
@@ -210,3 +216,14 @@ def test_a_real_sensor_is_sound_and_its_planted_faults_are_measured(name: str) -
         known = np.isfinite(found)
         assert known.sum() >= 2
         assert found[known] == pytest.approx(1.0 / np.array(factor)[known], abs=0.06)
+
+
+def test_an_answer_that_was_lost_does_not_hide_the_joint() -> None:
+    random = np.random.default_rng(1)
+    sides = [tuple(random.normal(size=(800, 3)) for _ in range(2)) for _ in range(2)]
+    (one, _), (other, _) = sides
+    whole = shared_joint((one, sides[0][1]), (other, sides[1][1]), RATE_HZ)
+    one[10] = np.nan
+    found = shared_joint((one, sides[0][1]), (other, sides[1][1]), RATE_HZ)
+    assert found.residual_m_s2 == pytest.approx(whole.residual_m_s2, rel=0.05)
+    assert found.motion_m_s2 == pytest.approx(whole.motion_m_s2, rel=0.05)
