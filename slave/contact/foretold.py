@@ -51,7 +51,8 @@ class ForetoldTorque:
 
         `stand_rad` (J,): where the joints are, at rest, when it begins.
         """
-        if self._position_rad is None or not 0.0 < dt_s <= LONGEST_S:
+        known = self._position_rad is not None and math.isfinite(self._position_rad.sum())
+        if self._position_rad is None or not known or not 0.0 < dt_s <= LONGEST_S:
             self._needed.clear()
             self._position_rad, self._velocity_rad_s = stand_rad, np.zeros_like(stand_rad)
             dt_s = 0.0

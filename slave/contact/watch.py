@@ -153,11 +153,12 @@ class ContactWatch:
         settled = self.observer.settled
         if not settled:
             return
-        ready = self.observer.ready
-        if ready:
-            self._ready_ns = now_ns
         # a hard push is noticed before the longer time constants have settled
         shares = (np.abs(self.observer.residuals_nm) / self._thresholds_nm)[:settled]
+        # what is no number exceeds no threshold: that is no detection
+        ready = self.observer.ready and bool(np.isfinite(shares[:, self._told]).all())
+        if ready:
+            self._ready_ns = now_ns
         self.share = share = np.where(self._told, shares.max(axis=0), 0.0)
         pushed = share > 1.0
         if pushed.any():

@@ -158,6 +158,21 @@ def test_after_a_gap_a_contact_lasts_until_every_time_constant_has_settled() -> 
     assert robot.watch.finding is None
 
 
+def test_a_threshold_that_is_no_number_is_no_detection_and_does_not_stay() -> None:
+    robot, nowhere = Standing(ContactConfig(required=True)), np.full(25, np.nan)
+    for _ in range(2):
+        robot.watch.wrote(0.005, nowhere, nowhere)
+    robot.run(120, push(5.0, robot.watch))
+    assert "no contact detection" in robot.watch.missing(robot.now_ns)
+    assert robot.watch.fault(robot.now_ns) is not None
+    for _ in range(2):
+        robot.watch.wrote(0.005, STILL_RAD, STILL_RAD)
+    robot.run(120)
+    assert robot.watch.missing(robot.now_ns) == ""
+    robot.run(100, push(1.5, robot.watch))
+    assert robot.watch.finding is not None
+
+
 def test_angles_that_stay_away_are_no_detection() -> None:
     robot = Standing()
     for _ in range(150):
