@@ -162,11 +162,15 @@ class Conversation:
         if self._echo is not None:
             self._echo.delay_ms = delay_ms
 
-    def on_line(self) -> None:
-        """Enter was pressed: mute, or open the microphone."""
-        sys.stdin.readline()
+    def on_line(self) -> bool:
+        """Enter was pressed: mute, or open the microphone. False where the terminal has gone: it is muted."""
+        try:
+            pressed = bool(sys.stdin.readline())
+        except OSError:
+            pressed = False
         with self._lock:
-            self.end.muted = not self.end.muted
+            self.end.muted = not self.end.muted if pressed else True
+        return pressed
 
     def words(self) -> str:
         """One line for the person here."""
@@ -194,8 +198,13 @@ async def _show(conversation: Conversation, stop: asyncio.Event, seconds: float)
     loop = asyncio.get_running_loop()
     end_s = loop.time() + seconds if seconds else None
     reads = sys.stdin.isatty()
+
+    def on_line() -> None:
+        if not conversation.on_line():
+            loop.remove_reader(sys.stdin.fileno())
+
     if reads:
-        loop.add_reader(sys.stdin.fileno(), conversation.on_line)
+        loop.add_reader(sys.stdin.fileno(), on_line)
     try:
         with Live(console=Console(), refresh_per_second=5) as live:
             while not stop.is_set() and (end_s is None or loop.time() < end_s):

@@ -80,3 +80,36 @@ def test_it_is_off_by_default_and_says_what_to_set(tmp_path: Path) -> None:
 def test_one_side_must_be_named() -> None:
     result = CliRunner().invoke(cli.app, ["voice"])
     assert "--master or by --slave" in str(result.exception)
+
+
+class GoneTerminal:
+    """Says what a terminal does whose other end was closed."""
+
+    def __init__(self, fails: bool) -> None:
+        self._lines = ["\n"]
+        self._fails = fails
+
+    def readline(self) -> str:
+        """One line that was pressed before; then nothing."""
+        line = self._lines.pop() if self._lines else ""
+        if not line and self._fails:
+            raise OSError(5, "Input/output error")
+        return line
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_terminal_that_has_gone_mutes_and_never_opens_the_microphone(
+    monkeypatch: pytest.MonkeyPatch, fails: bool
+) -> None:
+    """It can be read at once, again and again: each time would be taken for Enter."""
+    pytest.importorskip("av", reason="the extra `voice` is not installed")
+
+    async def story() -> None:
+        async with open_link(LinkConfig(listen=[free_endpoint()]), ROBOT) as link:
+            one = Conversation(place(LinkConfig(), ""), link)
+            one.end.muted = True
+            monkeypatch.setattr("sys.stdin", GoneTerminal(fails))
+            pressed = [(one.on_line(), one.end.muted) for _ in range(4)]
+            assert pressed == [(True, False), *[(False, True)] * 3]
+
+    run(story)
