@@ -47,9 +47,20 @@ def test_any_changed_byte_before_the_last_link_is_found(
     changed[at] ^= data.draw(st.integers(1, 255))
     (path := tmp_path / "changed.mcap").write_bytes(changed)
     found = check_recording(path)
-    # where a record's length is hit the records cannot be followed any more: less is vouched for, never more
-    assert found.broken or found.sealed <= at
+    assert found.broken, "also where a record's length is hit, and the records cannot be followed any more"
     assert found.sealed <= at
+
+
+def test_a_changed_length_of_a_record_is_no_end(whole: Path, tmp_path: Path) -> None:
+    """It would look like a file that was cut off there."""
+    content, at = bytearray(whole.read_bytes()), 8
+    while at < check_recording(whole).sealed:
+        for changed in (at + 1, at + 3, at + 8):
+            (path := tmp_path / "changed.mcap").write_bytes(
+                content[:changed] + bytes([content[changed] ^ 0x41]) + content[changed + 1 :]
+            )
+            assert check_recording(path).broken, changed
+        at += 9 + int.from_bytes(content[at + 1 : at + 9], "little")
 
 
 @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
