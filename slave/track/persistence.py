@@ -20,6 +20,8 @@ _OMEGA_PER_S = 5.0
 """ω of a joint of which nothing is known, or that moves by much less than `_SPEED_RAD_S`."""
 _SHARE = 1.15
 LEAST_S, MOST_S = 0.03, 0.25
+_REST_RAD_S = math.radians(3.0)
+"""Sensors at rest tell some 0.5 °/s; a reach has tens."""
 _RESTLESS_S, _EVEN_S = 0.1, 0.16
 """τ of a movement that has no steadiness at all, and of one that has all of it. README.md has the figures."""
 
@@ -73,6 +75,13 @@ class Persistence:
     def lasts_s(self) -> Array:
         """(J,) τ, s: for how long a velocity is believed."""
         out: Array = np.minimum(np.maximum(_SHARE / self.omega_per_s, LEAST_S), MOST_S)
+        return out
+
+    @property
+    def moving(self) -> Array:
+        """(J,) between 0 and 1: how far what is told is movement, not noise of a joint at rest."""
+        velocity2 = np.asarray(self._velocity2)
+        out: Array = velocity2 / (velocity2 + _REST_RAD_S**2)
         return out
 
 

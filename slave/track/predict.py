@@ -110,7 +110,8 @@ class Predict:
         rate = min(max(_PERIOD_S / elapsed_s, 1.0), 4.0)
         decay = _DECAY / self._blend_s * rate**_RATE_POWER
         faster = max(_EVEN_DECAY / self._blend_s - decay, 0.0)
-        even = decay + faster * steadiness(self._believed.lasts_s)
+        # a joint at rest seems steady; to follow its noise fast would shake the robot
+        even = decay + faster * steadiness(self._believed.lasts_s) * self._persistence.moving
         self._correction.begin(now_ns, old, new, decay, even)
 
     def _course(self, estimate: Estimate, now_ns: int) -> Course:

@@ -206,3 +206,17 @@ def test_two_samples_at_nearly_one_instant_cause_no_acceleration() -> None:
         position, velocity = course(tracker, ms)
         assert abs(position) < 0.1
         assert abs(velocity) < 2.0
+
+
+def test_the_noise_of_a_still_operator_does_not_shake_the_robot() -> None:
+    """0.05° and 0.4°/s of noise at rest: 268°/s² with the corrections of an even movement, 91 without."""
+    draw = np.random.default_rng(1)
+    accelerations = []
+    tracker, velocity_before = fresh(), 0.0
+    for k in range(200):
+        feed(tracker, k, np.radians(0.05) * draw.normal(), np.radians(0.4) * draw.normal())
+        for ms in np.arange(PERIOD * k + TRANSIT, PERIOD * (k + 1) + TRANSIT, 5.0).tolist():
+            velocity = float(course(tracker, ms)[1][0])
+            accelerations.append((velocity - velocity_before) / 0.005)
+            velocity_before = velocity
+    assert np.degrees(np.std(accelerations[400:])) < 150.0
