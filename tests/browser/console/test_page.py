@@ -19,6 +19,11 @@ pytestmark = [
 ]
 
 
+def engages(fake: FakeConsole) -> list[dict[str, Any]]:
+    """What the page asked of robots that shall move."""
+    return [body for what, body in fake.posted if what == "act" and body.get("act") == "engage"]
+
+
 def test_it_moves_within_two_seconds_of_opening(page: Any, fake: FakeConsole) -> None:
     took_ms: list[float] = []
     while (
@@ -112,11 +117,21 @@ def test_engage_wants_a_second_of_holding(page: Any, fake: FakeConsole) -> None:
     page.wait_for_timeout(300)
     page.keyboard.up("F2")
     page.wait_for_timeout(1000)
-    assert ("act", {"act": "engage", "robot": "robot-1"}) not in fake.posted
+    assert not engages(fake)
     page.keyboard.down("F2")
-    until(page, lambda: ("act", {"act": "engage", "robot": "robot-1"}) in fake.posted)
+    until(page, lambda: engages(fake) == [{"act": "engage", "robot": "robot-1", "together": False}])
     page.keyboard.up("F2")
     until(page, lambda: state(page) == "aligns")
+
+
+def test_several_robots_move_together_only_by_shift(page: Any, fake: FakeConsole) -> None:
+    fake.guard, fake.reason = "hold", "nobody has engaged"
+    until(page, lambda: state(page) == "holds")
+    page.keyboard.down("Shift")
+    page.keyboard.down("F2")
+    until(page, lambda: engages(fake) == [{"act": "engage", "robot": "robot-1", "together": True}])
+    page.keyboard.up("F2")
+    page.keyboard.up("Shift")
 
 
 def test_disengage_mark_and_language_by_key(page: Any, fake: FakeConsole) -> None:
@@ -170,7 +185,7 @@ def test_nobody_engages_what_the_page_does_not_see(page: Any, fake: FakeConsole)
     page.keyboard.down("F2")
     until(page, lambda: "Not sent" in page.inner_text("#told"))
     page.keyboard.up("F2")
-    assert ("act", {"act": "engage", "robot": "robot-1"}) not in fake.posted
+    assert not engages(fake)
 
 
 def test_a_page_that_is_told_nothing_stops_the_robot_that_its_address_names(
