@@ -56,11 +56,13 @@ class PersonJudgement:
     findings: tuple[PersonFinding, ...]
     not_judged: tuple[str, ...]
     """Gyro axes that the motion did not show, as node and axis."""
+    lacking: tuple[str, ...] = ()
+    """Nodes that the steps ask something of, and that are not in the recording."""
 
     @property
     def accepted(self) -> bool:
-        """Whether nothing is wrong."""
-        return not self.findings
+        """Whether nothing is wrong, and nothing that was asked for is missing."""
+        return not self.findings and not self.lacking
 
 
 def judge_person(

@@ -91,6 +91,8 @@ STEPS = (
     PersonStep("stand again", {"en": "Stand as at the beginning.", "zh": "像开始时一样站立。"}),
 )  # fmt: skip
 """In their order, `STEP_S` each."""
+LOOKED_AT = frozenset().union(*(step.moves for step in STEPS))
+"""The segments that the steps ask something of: fingers and others are not."""
 
 
 def expected(step: PersonStep, segment: str) -> float | None:

@@ -109,7 +109,13 @@ def _check_person(
     if not judged.accepted and as_json:
         raise typer.Exit(1)
     if not judged.accepted:
-        raise TandemError("refused:\n" + "\n".join(f"{one.node}: {one.words}" for one in judged.findings))
+        why = [f"{one.node}: {one.words}" for one in judged.findings]
+        if judged.lacking:
+            why.append(
+                f"not in the recording: {', '.join(judged.lacking)}; where the suit has no such node, say so "
+                "in suit.without_node"
+            )
+        raise TandemError("refused:\n" + "\n".join(why))
     if not as_json:
         typer.echo(f"{path}: accepted")
 

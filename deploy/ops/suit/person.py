@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from common.errors import TandemError
 from common.recording.node import NodeRecording
 from deploy.calibrate import capture as shared
 from deploy.measure.person.judge import PersonJudgement, judge_person
-from deploy.measure.person.steps import STEP_S, STEPS
+from deploy.measure.person.steps import LOOKED_AT, STEP_S, STEPS
 from master.calibrate.recording import load_recordings
 from master.config import MasterConfig
 from master.suit.sweep import Sweep
@@ -47,7 +48,10 @@ async def lead_and_record(config: MasterConfig, out: Path, language: str, show: 
 
 
 def judge_recording(path: Path, config: MasterConfig, led: bool) -> PersonJudgement:
-    """Of the nodes that the recording and the suit both have. Raises RecordingError, TandemError."""
+    """Of the nodes that recording and suit both have; refused where one that the steps move is not recorded.
+
+    Raises RecordingError, TandemError.
+    """
     skeleton = config.skeleton
     names = skeleton.segment_names
     nodes: dict[str, NodeRecording] = {
@@ -60,4 +64,6 @@ def judge_recording(path: Path, config: MasterConfig, led: bool) -> PersonJudgem
         for name, parent in zip(names, skeleton.parents.tolist(), strict=True)
         if parent >= 0
     }
-    return judge_person(nodes, parents, led)
+    worn = LOOKED_AT.intersection(names) - config.suit.without_node.keys()
+    lacking = tuple(sorted(worn - nodes.keys()))
+    return replace(judge_person(nodes, parents, led), lacking=lacking)

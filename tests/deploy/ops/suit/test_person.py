@@ -47,6 +47,15 @@ def test_a_good_recording_is_accepted_and_a_mirrored_one_refused(recording: Path
     assert [(one["node"], one["what"]) for one in found["findings"]] == [("left_hand", "mirrored")]
 
 
+def test_a_node_that_is_not_in_the_recording_is_not_accepted_unseen(recording: Path, tmp_path: Path) -> None:
+    with np.load(recording) as file:
+        arrays: dict[str, Any] = {name: kept for name, kept in file.items() if "left_hand" not in name}
+    np.savez(tmp_path / "lacking.npz", **arrays)
+    status, said = checked("--recording", tmp_path / "lacking.npz")
+    assert status
+    assert "not in the recording: left_hand" in " ".join(said.split())
+
+
 def test_it_asks_for_a_file() -> None:
     status, said = checked()
     assert status
