@@ -26,6 +26,7 @@ parquet = pytest.importorskip("pyarrow.parquet", reason="the extra `export` is n
 pytestmark = [
     pytest.mark.live,
     pytest.mark.timeout(400),
+    pytest.mark.usefixtures("default_signals"),
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium here: apt install chromium"),
 ]
 ROOT = Path(__file__).parents[2]

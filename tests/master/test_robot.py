@@ -56,7 +56,7 @@ class FakeLink:
     def publish(self, topic: Topic) -> Callable[[bytes], None]:
         return self.put.setdefault(topic.name, []).append
 
-    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
+    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None], in_order: int = 0) -> None:
         self.hear[topic.name] = on_payload
 
     def declare_alive(self, role: str, instance: int, endpoints: Sequence[str]) -> None: ...

@@ -186,6 +186,7 @@ def test_every_logger_has_the_name_of_its_module() -> None:
         for room in ("common", "master", "slave", "deploy")
         for path in (ROOT / room).rglob("*.py")
         for call in re.findall(r"getLogger\(([^)]+)\)", path.read_text("utf-8"))
-        if call != "__name__"
+        # the simulated drives quieten the library that they stand on
+        if call != "__name__" and (path.name, call) != ("app.py", '"canopen"')
     ]
     assert other == []

@@ -19,6 +19,7 @@ from common.process.pacing import DueTick, TickGrid
 from common.wire.codec import decode, encode
 from common.wire.control import read_reply
 from common.wire.messages import Action, ClockReply, Command, CommandStamps, ControlReply, ControlRequest
+from common.wire.topics import STATE, Topic
 from slave import app
 from slave.backends import ServosConfig
 from slave.camera.config import CameraConfig
@@ -128,14 +129,15 @@ def where(rig: Rig) -> dict[str, float]:
 class DeafLink:
     def __init__(self) -> None:
         self.put = 0
+        """States."""
 
-    def publish(self, _: object) -> Callable[[bytes], None]:
+    def publish(self, topic: Topic) -> Callable[[bytes], None]:
         def put(_: bytes) -> None:
-            self.put += 1
+            self.put += topic is STATE
 
         return put
 
-    def subscribe(self, *_: object) -> None: ...
+    def subscribe(self, *_: object, **__: object) -> None: ...
 
     def subscribe_keys(self, *_: object) -> None: ...
 
