@@ -75,6 +75,8 @@ class _Sample:
     """As Zenoh hands it over."""
 
     key_expr = "tandem/r/voice"
+    attachment = None
+    """Of one path: nothing to tell copies by."""
 
     def __init__(self, body: bytes) -> None:
         self.payload = self
