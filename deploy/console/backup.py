@@ -1,4 +1,4 @@
-"""Hands each stop to a process that outlives the console, before anybody is told that it is asked for."""
+"""Hands each stop to a process that outlives the console. The page gets its answer only after that."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class ProvedWorld:
         self._readings: deque[EncoderReading] = deque(maxlen=1 + self._ticks("encoder"))
         self._turn = 0
         self._suit_answers = world.suit.on_sync
-        world.suit.on_sync = self._on_sync  # type: ignore[method-assign]
+        world.suit.on_sync = self._on_sync  # type: ignore[method-assign]  # the node answers SYNC too
         world.inject.write, world.inject.read, world.inject.watch = self._write, self._read, self._watch
 
     def _ticks(self, place: str) -> int:

@@ -71,7 +71,7 @@ def test_lost_ones_are_missing_and_counted_and_the_order_holds() -> None:
 
 
 def test_after_a_pause_of_the_link_old_words_are_dropped_not_played_late() -> None:
-    """3 s of packets come at once, as after an outage or a process that stood still."""
+    """Packets of 3 s arrive together, as after an outage."""
     buffer = JitterBuffer()
     came = [(max(at, 250 * FRAME_NS), i) if 100 <= i < 250 else (at, i) for at, i in arrivals(600, 0.0)]
     heard = played(sorted(came), 600 * FRAME_NS, buffer)
