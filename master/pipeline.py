@@ -1,6 +1,6 @@
 """From CAN frames to joint angles and commands, without a clock, a bus or a link.
 
-poll ▸ calibrate ▸ low-pass ▸ orientation ▸ (every 16th tick) joint angles ▸ command
+poll ▸ calibrate ▸ low-pass ▸ orientation ▸ (each deciding tick) joint angles ▸ command
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class MasterPipeline:
         self._window_open = False
         self.last_sweep: Sweep | None = None
         """The newest tick's readings, before the filters."""
-        self._decided_period = -1
+        self._decided_tick = -1
         self._parts: tuple[Callable[[], Doubts], ...] = (self._of_suit, self._of_estimator)
         self.doubts: Doubts = {}
         """Nodes whose readings were doubted when joint angles were last computed."""
@@ -98,6 +98,15 @@ class MasterPipeline:
     def bus_down(self, bus: str) -> None:
         """Count the nodes of a failed bus as lost: their joints are invalid until they answer again."""
         self.poll.bus_down(bus)
+
+    @property
+    def decimation(self) -> int:
+        """One tick in so many yields a command."""
+        return self._decimation
+
+    def set_decimation(self, ticks: int) -> None:
+        """From now on one tick in so many decides; two commands are never further apart than the larger."""
+        self._decimation = ticks
 
     def ask_zero_pose(self, by: str, now_ns: int) -> None:
         """The operator asks for the zero pose to be taken again; `by` says how, in words."""
@@ -129,13 +138,13 @@ class MasterPipeline:
         self.last_sweep = sweep
         self._watch_taps(sweep)
         # after a missed deciding tick the next one decides, so that no command is missing
-        period = sweep.tick // self._decimation
         disbelieved, before = self.plausibility.doubted | clashing, self._disbelieved
         self._disbelieved = disbelieved
         # a doubted node is reported at once: otherwise its joint would be driven for another period
-        if period == self._decided_period and not (disbelieved & ~before).any():
+        period = sweep.tick // self._decimation, self._decided_tick // self._decimation
+        if period[0] == period[1] and not (disbelieved & ~before).any():
             return None
-        self._decided_period = period
+        self._decided_tick = sweep.tick
         return self._joint_angles(sweep)
 
     def _watch_taps(self, sweep: Sweep) -> None:

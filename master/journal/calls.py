@@ -26,9 +26,9 @@ SNAPSHOT = "suit/snapshot"
 MISSING = "suit/missing"
 """Stands where a recorder missed messages: what follows cannot be computed before the next snapshot."""
 VERSION = 1
-TICK, FRAME, CLOSE, BUS_DOWN, ZERO_POSE = range(5)
+TICK, FRAME, CLOSE, BUS_DOWN, ZERO_POSE, DECIMATION = range(6)
 """The calls, by the number that begins each: [TICK, tick, now_ns], [FRAME, bus, identifier, data, now_ns],
-[CLOSE, now_ns], [BUS_DOWN, bus], [ZERO_POSE, asked by, now_ns]."""
+[CLOSE, now_ns], [BUS_DOWN, bus], [ZERO_POSE, asked by, now_ns], [DECIMATION, ticks]."""
 
 Call = tuple[object, ...]
 Put = Callable[[str, bytes], object]
@@ -53,6 +53,9 @@ class Pipeline(Protocol):
     def ask_zero_pose(self, by: str, now_ns: int) -> None:
         """The operator asks for the zero pose to be taken again."""
 
+    def set_decimation(self, ticks: int) -> None:
+        """From now on one tick in so many decides."""
+
 
 class JournaledPipeline:
     """Passes each call on to a pipeline and writes it down."""
@@ -63,6 +66,7 @@ class JournaledPipeline:
         self._put = put
         self._wanted = wanted
         self._calls: list[Call] = []
+        self._decimation: int | None = None
 
     def tick(self, tick: int, now_ns: int) -> tuple[CanFrame, JointAngleSample | None]:
         """Open a tick; all calls before it are put as one message."""
@@ -90,6 +94,18 @@ class JournaledPipeline:
         """The operator asks for the zero pose to be taken again."""
         self._calls.append((ZERO_POSE, by, now_ns))
         self._pipeline.ask_zero_pose(by, now_ns)
+
+    def set_decimation(self, ticks: int) -> None:
+        """From now on one tick in so many decides."""
+        self._decimation = ticks
+        self._calls.append((DECIMATION, ticks))
+        self._pipeline.set_decimation(ticks)
+
+    def begin_again(self) -> None:
+        """A reader may begin here: what is in force comes first, where it is not what the file says."""
+        self.flush()
+        if self._decimation is not None:
+            self._calls.append((DECIMATION, self._decimation))
 
     def flush(self) -> None:
         """Put what was called since the last time."""
@@ -178,6 +194,8 @@ def apply(call: Call, pipeline: Pipeline) -> JointAngleSample | None:
             pipeline.bus_down(bus)
         case (int(kind), str(by), int(now_ns)) if kind == ZERO_POSE:
             pipeline.ask_zero_pose(by, now_ns)
+        case (int(kind), int(ticks)) if kind == DECIMATION and ticks > 0:
+            pipeline.set_decimation(ticks)
         case _:
             raise RecordingError(f"a message of {FRAMES} has a call that is none: {str(call)[:60]}")
     return None

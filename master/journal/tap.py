@@ -49,5 +49,5 @@ class MasterTap:
             self._failed = True
             log.exception("no snapshot can be taken, so recordings of this run cannot be computed again")
             return
-        self.pipeline.flush()
+        self.pipeline.begin_again()
         self._readers.put_snapshot(SNAPSHOT, snapshot)

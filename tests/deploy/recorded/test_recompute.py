@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from importlib import resources
 from pathlib import Path
@@ -43,7 +44,7 @@ class RecordedBench(Bench):
         self.pipeline = self.calls  # type: ignore[assignment]  # what the bench calls of it, it has
 
     def snapshot(self) -> None:
-        self.calls.flush()
+        self.calls.begin_again()
         self.entries.append(Recorded(SNAPSHOT, msgpack.packb(recall(self.raw))))
 
 
@@ -90,6 +91,59 @@ def test_it_begins_in_a_zero_pose_that_is_being_taken_again_and_after_a_bus_fail
     pairs = replayed(bench, before)
     assert len(pairs) >= 60
     assert all(pair.identical for pair in pairs)
+
+
+def changing_rates(bench: RecordedBench) -> list[int]:
+    """The deciding ticks while the rate of commands goes up and down, each time between two of them."""
+    ticks = []
+    for decimation, count in ((16, 323), (8, 86), (4, 42), (16, 85), (4, 61), (8, 60)):
+        bench.calls.set_decimation(decimation)
+        ticks += [angles.tick for angles in bench.run(count)]
+    return ticks
+
+
+def test_every_posture_is_the_same_where_the_rate_of_commands_changed() -> None:
+    bench = RecordedBench(*TROUBLES)
+    bench.snapshot()
+    ticks = changing_rates(bench)
+    pairs = replayed(bench)
+    assert [pair.computed.tick for pair in pairs] == ticks
+    assert len(ticks) > 60
+    assert all(pair.identical for pair in pairs)
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_a_recording_that_begins_later_knows_the_rate_in_force(other: bool) -> None:
+    """Another configuration learns anew, without the snapshot's memory: the rate must stand beside it."""
+    bench = RecordedBench('motion="bottle"')
+    bench.run(320)
+    bench.calls.set_decimation(4)
+    bench.run(16)
+    before = len(bench.entries)
+    bench.snapshot()
+    ticks = [angles.tick for angles in bench.run(160)]
+    pairs = replayed(bench, before, bench.config if other else None)
+    assert [pair.computed.tick for pair in pairs] == ticks
+    assert len(ticks) == 40
+
+
+def test_between_two_commands_no_more_than_the_slower_rate_s_time_passes() -> None:
+    bench = RecordedBench()
+    bench.run(320)
+    rng = np.random.default_rng(7)
+    decided: list[int] = []
+    for _ in range(60):
+        bench.calls.set_decimation(int(rng.choice([4, 8, 16])))
+        decided += [angles.tick for angles in bench.run(int(rng.integers(1, 30)))]
+    apart = [after - before for before, after in itertools.pairwise(decided)]
+    assert max(apart) <= 16
+    bench.calls.set_decimation(4)
+    bench.run(16)
+    for decimation in (8, 16):
+        bench.calls.set_decimation(decimation)
+        decided = [angles.tick for angles in bench.run(67)]
+        assert {tick % decimation for tick in decided[1:]} == {0}
+        assert decided[0] % decimation == 0, "none comes out of turn where the rate falls"
 
 
 def test_without_the_snapshot_the_first_seconds_differ() -> None:
