@@ -15,6 +15,7 @@ from slave.track.correction import Correction
 from slave.track.estimate import Estimate, corrected, first
 from slave.track.lateness import Lateness
 from slave.track.persistence import Persistence, steadiness
+from slave.track.spacing import Spacing
 from slave.track.tracker import TrackTarget
 
 _LEAST_FULL_S = 0.15
@@ -47,6 +48,7 @@ class Predict:
         self._max_horizon_s = max_horizon_s
         self._correction = Correction()
         self._lateness = Lateness()
+        self._spacing = Spacing()
         self._persistence = Persistence()
         self._confidence = Confidence()
         self._estimate: Estimate | None = None
@@ -62,6 +64,7 @@ class Predict:
         """Forget every sample, and what was learnt of the link."""
         self._estimate = None
         self._lateness.reset()
+        self._spacing.reset()
         self._persistence.reset()
         self._confidence.reset()
         self._correction.reset()
@@ -83,10 +86,11 @@ class Predict:
             after = first(sampled_ns, position_rad, velocity_rad_s)
         else:
             mean_age_s = to_s(now_ns - sampled_ns) + 0.5 * elapsed_s + self._servo_lag_s
+            self._spacing.note(elapsed_s)
             self._confidence.prove(sampled_ns, position_rad, mean_age_s)
             after = corrected(before, sampled_ns, position_rad, velocity_rad_s)
         self._believe(after, velocity_rad_s)
-        self._correct(now_ns, old, self._course(after, now_ns), elapsed_s)
+        self._correct(now_ns, old, self._course(after, now_ns))
 
     def target(self, now_ns: int) -> TrackTarget | None:
         """The course at `now_ns`."""
@@ -106,8 +110,9 @@ class Predict:
         span_s, _ = self._coasted(math.inf)
         self._believed = foretold.scaled(_FARTHEST_RAD / np.maximum(foretold.farthest(span_s), _FARTHEST_RAD))
 
-    def _correct(self, now_ns: int, old: Course, new: Course, elapsed_s: float) -> None:
-        rate = min(max(_PERIOD_S / elapsed_s, 1.0), 4.0)
+    def _correct(self, now_ns: int, old: Course, new: Course) -> None:
+        # by the usual time between commands: one out of turn does not make this correction a small one
+        rate = min(max(_PERIOD_S / (self._spacing.usual_s or _PERIOD_S), 1.0), 4.0)
         decay = _DECAY / self._blend_s * rate**_RATE_POWER
         faster = max(_EVEN_DECAY / self._blend_s - decay, 0.0)
         # a joint at rest seems steady; to follow its noise fast would shake the robot

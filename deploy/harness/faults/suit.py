@@ -91,7 +91,7 @@ SUIT = (
             person="Repair the node. Its joints come back slowly by themselves; "
             "until then engage is refused.",
             act=_suit(FaultsConfig(wrong_reading=[WrongReading(node=NODE, kind=kind, axis=axis)])),
-            concerns=_joints_of_node, strays_deg=3.0, sway_deg=1.0, stands_s=0.2 + BRAKED_S,
+            concerns=_joints_of_node, strays_deg=2.5, sway_deg=1.0, stands_s=0.2 + BRAKED_S,
         )
         for name, done, kind, axis in LIARS
     ),

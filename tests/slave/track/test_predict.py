@@ -5,7 +5,9 @@ from hypothesis import strategies as st
 
 from common.quaternion import Array
 from slave.guard import GuardConfig
+from slave.track.blend import Course
 from slave.track.continuation import Continuation
+from slave.track.correction import Correction
 from slave.track.estimate import Estimate, first
 from slave.track.persistence import MOST_S, Persistence
 from slave.track.predict import Predict
@@ -220,3 +222,25 @@ def test_the_noise_of_a_still_operator_does_not_shake_the_robot() -> None:
             accelerations.append((velocity - velocity_before) / 0.005)
             velocity_before = velocity
     assert np.degrees(np.std(accelerations[400:])) < 150.0
+
+
+def test_a_command_out_of_turn_is_corrected_no_faster_than_one_in_turn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The master sends one as it names a node: by the time since the last, it would decay at 40 a second."""
+    decays: list[float] = []
+    begin = Correction.begin
+
+    def noted(self: Correction, now_ns: int, old: Course, new: Course, decay: float, even: Array) -> None:
+        decays.append(decay)
+        begin(self, now_ns, old, new, decay, even)
+
+    monkeypatch.setattr(Correction, "begin", noted)
+    tracker = fresh()
+    for k in range(10):
+        feed(tracker, k, 0.1 * k, 1.25)
+    tracker.accept(
+        (9 * PERIOD + 15) * MS, (9 * PERIOD + 15 + TRANSIT) * MS, np.array([0.92]), np.array([1.25])
+    )
+    feed(tracker, 10, 1.0, 1.25)
+    assert decays == pytest.approx([1.8 / BLEND_S] * 11)
