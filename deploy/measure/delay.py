@@ -4,7 +4,10 @@ Angular speed, the length of a rate vector, is the same however a node sits on i
 be calibrated. Two series x and y, each with stamps of its own, are brought onto one grid and smoothed alike;
 each window is taken less its mean:
 
-    r(τ) = ⟨x(t), y(t + τ)⟩ / (‖x‖ ‖y‖)
+    r(τ) = Σ ⟨x(t), y(t + τ)⟩ / √(Σ ‖x‖² Σ ‖y‖²)
+
+the sums over the windows, so that a window counts by how much moves in it. Where the two motions differ in
+shape, as by prediction over a long line, a slow window's delay is another one's.
 
 The delay is where r is largest: the grid's best lag, then the top of the parabola through it and its
 neighbours. It is wrong by at most the larger of two bounds, for they fail in different ways:
@@ -93,7 +96,7 @@ def find_delay(
         return (
             f"{len(found)} of at least {LEAST_SEGMENTS} segments of {SEGMENT_S:g} s moved enough to be judged"
         )
-    whole = np.mean(found, axis=0)
+    whole = _curve(*np.sum(found, axis=0))
     top = _top(whole)
     if top is None:
         return f"the best fit lies at the end of the search, {search_s[0]:g} to {search_s[1]:g} s"
@@ -137,6 +140,7 @@ def _at(speed: AngularSpeed, at_ns: Nanoseconds) -> tuple[Array, NDArray[np.bool
 
 
 def _segments(x: Array, y: Array, usable: NDArray[np.bool_], lags: NDArray[np.int64]) -> list[Array | None]:
+    """Each window's sums, or None where it moved too little or was not heard."""
     length = int(SEGMENT_S * NS_PER_S) // STEP_NS
     return [
         _segment(x[at : at + length], y[at : at + length + len(lags) - 1])
@@ -147,14 +151,20 @@ def _segments(x: Array, y: Array, usable: NDArray[np.bool_], lags: NDArray[np.in
 
 
 def _segment(x: Array, y: Array) -> Array | None:
-    """The correlation of a window of the first with each window of the second."""
+    """(3, lags): ⟨x, y⟩, ‖x‖² and ‖y‖² of a window of the first with each window of the second."""
     if x.std() < LEAST_SPEED:
         return None
     windows = np.lib.stride_tricks.sliding_window_view(y, len(x))
     centred = windows - windows.mean(axis=1, keepdims=True)
-    norms = np.sqrt(np.einsum("lt,lt->l", centred, centred))
     own = x - x.mean()
-    out: Array = centred @ own / np.maximum(norms * np.linalg.norm(own), 1e-12)
+    return np.array(
+        [centred @ own, np.full(len(windows), own @ own), np.einsum("lt,lt->l", centred, centred)]
+    )
+
+
+def _curve(products: Array, own: Array, other: Array) -> Array:
+    """The correlation at each lag."""
+    out: Array = products / np.maximum(np.sqrt(own * other), 1e-12)
     return out
 
 
@@ -188,7 +198,7 @@ def _by_repetition(found: list[Array], lags: NDArray[np.int64], top: float) -> f
     """From the spread of the segments' own delays; each is looked for near the whole's."""
     reach = round(APART_S * NS_PER_S / STEP_NS)
     low, high = max(round(top) - reach, 0), min(round(top) + reach + 1, len(lags))
-    tops = [_top(each[low:high]) for each in found]
+    tops = [_top(_curve(*each)[low:high]) for each in found]
     own_ns = np.array([np.nan if t is None else (t + low - top) * STEP_NS for t in tops])
     own_ns = own_ns[np.isfinite(own_ns)]
     if len(own_ns) < LEAST_SEGMENTS:

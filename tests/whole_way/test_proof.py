@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS
+from common.quaternion import Array
 from deploy.experiments.prove.simulated import judge, simulate
-from deploy.measure.delay import AngularSpeed
+from deploy.measure.delay import SEARCH_S, SEGMENT_S, SMOOTH_S, AngularSpeed
 from deploy.measure.proof import (
     CAMERA,
     ENCODER,
@@ -35,18 +36,42 @@ def proof(network: str, *plant: str) -> tuple[dict[str, ProofRow], float]:
 
 
 def true_delay_ms(operator: AngularSpeed, robot: AngularSpeed) -> float:
-    """By another way than the estimator's: the shift of least squares of the noise-free speeds."""
+    """By another way than the estimator's: the shift of least squares of the noise-free speeds.
+
+    Over the same windows and of the same band: prediction over a long line makes the delay of one stretch, and
+    that of slow and of fast motion, differ by some ms.
+    """
     origin = operator.at_ns[0]
-    at_ms, seen_ms = ((one.at_ns - origin) / NS_PER_MS for one in (operator, robot))
-    inside = (at_ms > 500.0) & (at_ms < at_ms[-1] - 700.0)
-    shifts = np.arange(-300.0, 600.0, 0.5)
+    end_ms = float(operator.at_ns[-1] - origin) / NS_PER_MS
+    first_ms = -1e3 * SEARCH_S[0]
+    windows = int((end_ms - 1e3 * SEARCH_S[1] - first_ms) // (1e3 * SEGMENT_S))
+    at_ms = first_ms + np.arange(windows * 1e3 * SEGMENT_S)
+    moved = less_its_means(smoothed(operator, origin, at_ms), windows)
+    shifts = np.arange(-300.0, 600.0, 1.0)
+    seen = smoothed(robot, origin, np.arange(at_ms[0] + shifts[0], at_ms[-1] + shifts[-1] + 1.0))
     errors = [
-        np.mean((operator.rad_s[inside] - np.interp(at_ms[inside] + shift, seen_ms, robot.rad_s)) ** 2)
-        for shift in shifts
+        np.mean((moved - less_its_means(seen[shift : shift + len(at_ms)], windows)) ** 2)
+        for shift in range(len(shifts))
     ]
     best = int(np.argmin(errors))
     before, here, after = errors[best - 1 : best + 2]
-    return float(shifts[best] + 0.25 * (before - after) / (before - 2.0 * here + after))
+    return float(shifts[best] + 0.5 * (before - after) / (before - 2.0 * here + after))
+
+
+def less_its_means(value: Array, windows: int) -> Array:
+    each = value.reshape(windows, -1)
+    out: Array = (each - each.mean(axis=1, keepdims=True)).ravel()
+    return out
+
+
+def smoothed(speed: AngularSpeed, origin_ns: int, at_ms: Array) -> Array:
+    """The speed at each ms, without what is faster than the estimator looks at."""
+    sigma_ms = 1e3 * SMOOTH_S
+    reach = np.arange(-4.0 * sigma_ms, 4.0 * sigma_ms + 1.0)
+    wide_ms = np.arange(at_ms[0] + reach[0], at_ms[-1] + reach[-1] + 0.5)
+    kernel = np.exp(-0.5 * (reach / sigma_ms) ** 2)
+    value = np.interp(wide_ms, (speed.at_ns - origin_ns) / NS_PER_MS, speed.rad_s)
+    return np.convolve(value, kernel / kernel.sum(), mode="valid")
 
 
 def found(rows: dict[str, ProofRow], name: str) -> float:
