@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 
 from common.clock import to_ns, to_s
 from common.errors import CodecError
@@ -14,11 +15,18 @@ from common.metrics.slave import CameraMetrics, SlaveMetrics
 from common.skeleton import Skeleton
 from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics, Truth
-from common.wire.topics import COMMAND, STATE, STATISTICS, TRUTH
+from common.wire.topics import COMMAND, STATE, STATISTICS, TOPICS, TRUTH, Topic
 from deploy.harness.operator import GuardSight
 from deploy.measure import Trace
 
 Heard = Command | RobotState | Statistics | Truth
+KINDS: dict[str, type[Heard]] = {
+    COMMAND.name: Command,
+    STATE.name: RobotState,
+    TRUTH.name: Truth,
+    STATISTICS.name: Statistics,
+}
+"""What an observer hears, by the topic's name."""
 
 RATE_OVER_NS = 900_000_000
 """A rate is taken over at least this long: statistics come once a second, give or take a late tick."""
@@ -48,23 +56,25 @@ class Observer:
         """What the robot last published of its camera while recording; None where it has none."""
         self.listeners: list[Callable[[Heard], None]] = []
         """Each is called with every message, whether recording or not."""
+        self.tapes: list[Callable[[Topic, bytes, int], None]] = []
+        """Each is called with every readable message as it came: topic, bytes, time of arrival (ns)."""
         self._known_from = -1
         """Number of the command since which every joint was known; -1: one is not."""
         self._news = asyncio.Event()
         self._marks: dict[str, tuple[int, int]] = {}
         self.rates_hz: dict[str, float] = {}
         """From the senders' numbers and clocks: this side receives only the newest of several that wait."""
-        link.subscribe(COMMAND, lambda payload, _: self._take(payload, Command))
-        link.subscribe(STATE, lambda payload, _: self._take(payload, RobotState))
-        link.subscribe(TRUTH, lambda payload, _: self._take(payload, Truth))
-        link.subscribe(STATISTICS, lambda payload, _: self._take(payload, Statistics))
+        for topic, kind in KINDS.items():
+            link.subscribe(TOPICS[topic], partial(self._take, TOPICS[topic], kind))
 
-    def _take(self, payload: bytes, kind: type[Heard]) -> None:
+    def _take(self, topic: Topic, kind: type[Heard], payload: bytes, arrived_ns: int) -> None:
         try:
             message = decode(payload, kind, self._joints)
         except CodecError:
             self.undecodable += 1
             return
+        for tape in self.tapes:
+            tape(topic, payload, arrived_ns)
         for listener in self.listeners:
             listener(message)
         if isinstance(message, Statistics):

@@ -46,17 +46,26 @@ def describe(config: _Config) -> dict[str, str]:
 
     Raises OSError where a file that it names has gone.
     """
-    files: dict[str, str] = {}
-    table = {**config.model_dump(exclude=_NOT_READ), "profile": _profile(config.profile, files)}
+    table, files = embedded(config.profile, config.model_dump(exclude=_NOT_READ))
     return {
         "role": "master",
         "robots": " ".join(config.commanded),
         "tandem": software().tandem,
         "numpy": np.__version__,
         "machine": f"{platform.machine()} {platform.system()}",
-        CONFIG: json.dumps(_embedded(table, files)),
-        FILES: json.dumps(files),
+        CONFIG: table,
+        FILES: files,
     }
+
+
+def embedded(profile: str, sections: Mapping[str, object]) -> tuple[str, str]:
+    """A configuration of either side as JSON, and the content of the files that it names, as JSON too.
+
+    `profile`: its robot's, by name or path. Raises OSError where a file has gone.
+    """
+    files: dict[str, str] = {}
+    table = _embedded({**sections, "profile": _profile(profile, files)}, files)
+    return json.dumps(table), json.dumps(files)
 
 
 def _profile(name: str, files: dict[str, str]) -> object:

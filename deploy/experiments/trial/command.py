@@ -78,6 +78,14 @@ MaxAge = Annotated[
         max=2.0,
     ),
 ]
+Record = Annotated[
+    bool,
+    typer.Option(
+        "--record/--no-record",
+        help="Keep the messages of each run in `recordings/`, from which `tandem trial verify` computes all "
+        "figures again: some 30 kB a second, never more than 500 MB of messages a run.",
+    ),
+]
 ReportFolder = Annotated[
     Path, typer.Option(help="Folder for the report and the results of every run.", file_okay=False)
 ]
@@ -120,6 +128,7 @@ def trial(
     router: Router = False,
     max_age: MaxAge = 0.0,
     report: ReportFolder = Path("trial"),
+    record: Record = True,
     tasks: Tasks = None,
     remote: Remote = None,
     link: LinkFile = None,
@@ -153,9 +162,9 @@ def trial(
         max_age_s=max_age, hosts=remote or "namespaces",
     )  # fmt: skip
     if remote is None:
-        _run_here(plan, report, tasks)
+        _run_here(plan, report, tasks, record)
     else:
-        _run_remote(plan, report, tasks, link)
+        _run_remote(plan, report, tasks, record, link)
 
 
 def _follow_people(
@@ -220,15 +229,15 @@ def verify(
     folder: Annotated[Path, typer.Argument(help="Report folder of a trial.", exists=True, file_okay=False)],
     tasks: Tasks = None,
 ) -> None:
-    """Compute a trial's tables again from its cells, and compare them with the report in the folder.
+    """Compute a trial's figures and tables again from its recordings, and compare them with the folder's.
 
-    If the folder is sealed (`tandem session seal`), the seal is verified first. It ends with status 1 and
-    names the lines and figures that differ.
+    The recordings hold everything that this needs, so it works on any machine. A seal (`tandem session
+    seal`) is verified first. It ends with status 1 and names the bytes, lines and figures that differ.
+    Without recordings, the tables are computed from the cells.
 
     Example: `tandem trial verify trial`
     """
     from deploy.experiments.trial.cell.folder import Folder
-    from deploy.experiments.trial.report.tasks import TASKS
     from deploy.experiments.trial.report.verify import differences
     from deploy.study.seal import SEAL
     from deploy.study.seal import verify as verify_seal
@@ -237,15 +246,16 @@ def verify(
     changed = verify_seal(folder)[1] if sealed else []
     for one in changed:
         typer.echo(f"{one.name}: {one.words}")
-    apart = differences(Folder(folder), tasks or TASKS)
-    for words in apart:
+    checked = differences(Folder(folder), tasks, lambda slug: typer.echo(f"computing {slug}", err=True))
+    for words in checked.differences:
         typer.echo(words)
-    if changed or apart:
-        raise TandemError(
-            f"{folder}: {len(changed) + len(apart)} things are not as sealed, or not what the cells give"
-        )
+    given = "recordings give" if checked.recomputed else "cells give"
+    if changed or checked.differences:
+        count = len(changed) + len(checked.differences)
+        raise TandemError(f"{folder}: {count} things are not as sealed, or not what the {given}")
     words = "the seal is whole" if sealed else "it is not sealed"
-    typer.echo(f"{folder}: every table is what the cells give; {words}")
+    from_files = f"{checked.recomputed} of {checked.cells} cells were computed from their recordings"
+    typer.echo(f"{folder}: every table is what the {given}; {from_files}; {words}")
 
 
 @app.command()
@@ -260,17 +270,19 @@ def report(
     _finish(folder, tasks, Console())
 
 
-def _run_here(plan: TrialPlan, path: Path, tasks: Path | None) -> None:
+def _run_here(plan: TrialPlan, path: Path, tasks: Path | None, record: bool) -> None:
+    from functools import partial
+
     from deploy.experiments.trial.cell.stage import run_cell
     from deploy.sim.network.namespaces import why_not
 
     reason = why_not()
     if reason is not None:
         raise NetworkError(f"{reason}; with the robot on another host, no such rights are needed: --remote")
-    _run(plan, path, tasks, run_cell)
+    _run(plan, path, tasks, partial(run_cell, folder=path if record else None))
 
 
-def _run_remote(plan: TrialPlan, path: Path, tasks: Path | None, link: Path | None) -> None:
+def _run_remote(plan: TrialPlan, path: Path, tasks: Path | None, record: bool, link: Path | None) -> None:
     from dataclasses import replace
     from functools import partial
 
@@ -281,7 +293,7 @@ def _run_remote(plan: TrialPlan, path: Path, tasks: Path | None, link: Path | No
 
     tls = None if link is None else load_config(link, MasterConfig).link.tls
     plan = replace(plan, max_age_s=plan.max_age_s or GuardConfig().max_age_s)
-    _run(plan, path, tasks, partial(run_remote_cell, tls=tls))
+    _run(plan, path, tasks, partial(run_remote_cell, tls=tls, folder=path if record else None))
 
 
 def _run(plan: TrialPlan, path: Path, tasks: Path | None, run_cell: RunCell) -> None:

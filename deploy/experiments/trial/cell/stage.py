@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from pathlib import Path
 
 from common.clock import monotonic_ns, to_s
 from common.config.load import load_config
 from common.errors import TandemError
 from deploy.examples.profiles import example
 from deploy.experiments.trial.cell.choice import why_impossible
-from deploy.experiments.trial.cell.judge import judged
+from deploy.experiments.trial.cell.conclude import conclude, open_tape
 from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 from deploy.experiments.trial.cell.recorder import MessageKeeper
 from deploy.experiments.trial.cell.recording import CellCourse, CellMessages, ScriptedOutage
 from deploy.experiments.trial.cell.remarks import hold_remarks
 from deploy.experiments.trial.cell.result import Cell, CellStatus
+from deploy.experiments.trial.cell.tape import AFTER, JUDGED, CellTape
 from deploy.harness.engage import EngageDriver, RigRobot, keep_engaged, until_tracking
 from deploy.harness.link_settings import needed_age_s, open_timeout_s
 from deploy.harness.operator import Operator
@@ -36,8 +38,17 @@ WATCH_S = 0.6
 LOOK_S = 0.1
 
 
-async def run_cell(plan: TrialPlan, key: CellKey, stop: asyncio.Event, show: Callable[[str], None]) -> Cell:
-    """Run it and judge it. What goes wrong in it is its result; only an interruption raises TandemError."""
+async def run_cell(
+    plan: TrialPlan,
+    key: CellKey,
+    stop: asyncio.Event,
+    show: Callable[[str], None],
+    folder: Path | None = None,
+) -> Cell:
+    """Run it and judge it. What goes wrong in it is its result; only an interruption raises TandemError.
+
+    `folder`: of the trial, where the cell's recording is kept.
+    """
     reason = why_impossible(key.setup)
     if reason is not None:
         return Cell(key, CellStatus.IMPOSSIBLE, reason)
@@ -47,21 +58,24 @@ async def run_cell(plan: TrialPlan, key: CellKey, stop: asyncio.Event, show: Cal
     overrides = _overrides(plan, key, age_s, opening)
     config = load_config(example("slave", plan.robot), SlaveConfig, overrides["slave"])
     settings = {"guard.max_age_s": f"{age_s:g}"}
+    tape = open_tape(folder, key, config, settings)
     try:
         async with (
             open_network(profile, seed=plan.seed_of(key)) as network,
             open_rig(key.setup.transport, overrides, plan.robot, routed=plan.router, network=network) as rig,
         ):
-            course = await _Story(plan, rig, network, stop, show).play(age_s)
+            course = await _Story(plan, rig, network, stop, show, tape).play(age_s)
             show("stopping")
             statuses = await rig.stop()
     except TandemError as error:
+        if tape is not None:
+            tape.close(None)
         if stop.is_set():  # a Ctrl-C reaches the processes too: that they end is then no failure
             raise TandemError("interrupted") from None
         return Cell(key, CellStatus.FAILED, str(error), settings=settings)
     ended = tuple(f"the {name} ended with status {status}" for name, status in statuses.items() if status)
     show("judging")
-    return await asyncio.to_thread(judged, key, course, config, settings, ended)
+    return await asyncio.to_thread(conclude, key, course, config, settings, ended, tape)
 
 
 def _overrides(plan: TrialPlan, key: CellKey, age_s: float, opening: str) -> dict[str, list[str]]:
@@ -77,16 +91,24 @@ class _Story:
     """The steps of one cell, on a rig over a network."""
 
     def __init__(
-        self, plan: TrialPlan, rig: Rig, network: Network, stop: asyncio.Event, show: Callable[[str], None]
+        self,
+        plan: TrialPlan,
+        rig: Rig,
+        network: Network,
+        stop: asyncio.Event,
+        show: Callable[[str], None],
+        tape: CellTape | None,
     ) -> None:
         self._plan = plan
         self._rig = rig
         self._network = network
         self._stop = stop
         self._show = show
-        self._recorder = MessageKeeper()
+        self._recorder = MessageKeeper(tape)
         self._remarks: list[str] = []
         rig.observer.listeners.append(self._recorder.hear)
+        if tape is not None:
+            rig.observer.tapes.append(tape.hear)
 
     async def play(self, max_age_s: float) -> CellCourse:
         """All of it. Raises TandemError."""
@@ -116,7 +138,7 @@ class _Story:
     async def _judged_time(self) -> tuple[CellMessages, dict[str, float], float, float]:
         self._show(f"following for {self._plan.seconds:g} s")
         children = self._rig.children
-        self._recorder.take()
+        self._recorder.take(JUDGED)
         for child in children.values():
             child.measure(first=True)
         before, began_ns = self._network.counters(), monotonic_ns()
@@ -130,7 +152,7 @@ class _Story:
         used = {name: child.cpu_percent for name, child in children.items() if name != "suit"}
         up = (after.to_robot.bytes - before.to_robot.bytes) / seconds
         down = (after.to_operator.bytes - before.to_operator.bytes) / seconds
-        return self._recorder.take(), used, up, down
+        return self._recorder.take(AFTER), used, up, down
 
     async def _outage(self) -> tuple[CellMessages, ScriptedOutage]:
         rig, observer = self._rig, self._rig.observer

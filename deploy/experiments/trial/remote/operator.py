@@ -19,14 +19,16 @@ from common.link.endpoint import SECURE
 from common.skeleton import Skeleton, load_skeleton
 from common.wire.codec import decode
 from common.wire.messages import RobotState, Statistics
+from common.wire.topics import STATE, STATISTICS, Topic
 from deploy.examples.profiles import example
 from deploy.experiments.trial.cell.choice import why_impossible
-from deploy.experiments.trial.cell.judge import judged
+from deploy.experiments.trial.cell.conclude import conclude, open_tape
 from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 from deploy.experiments.trial.cell.recorder import MessageKeeper
 from deploy.experiments.trial.cell.recording import CellCourse, on_masters_clock
 from deploy.experiments.trial.cell.remarks import hold_remarks
 from deploy.experiments.trial.cell.result import Cell, CellStatus
+from deploy.experiments.trial.cell.tape import JUDGED, NEITHER, CellTape
 from deploy.experiments.trial.remote import talk
 from deploy.harness.endpoints import Endpoints, free_port
 from deploy.harness.engage import EngageDriver, keep_engaged, until_all_track
@@ -75,14 +77,22 @@ class Partner:
                 raise TandemError(f"no {what} within {timeout_s:g} s: {answer.guard}, {answer.reason}")
             await asyncio.sleep(LOOK_S)
 
-    async def kept(self, skeleton: Skeleton) -> tuple[list[RobotState], list[Statistics]]:
+    async def kept(
+        self, skeleton: Skeleton, tape: CellTape | None = None
+    ) -> tuple[list[RobotState], list[Statistics]]:
         """The robot's messages while it was recorded, with its own clock's stamps. Raises TandemError."""
         states: list[RobotState] = []
         statistics: list[Statistics] = []
+        if tape is not None:
+            tape.stretch(JUDGED)
         while True:
             page = await self._ask(talk.Page(first=len(states)))
             states += [decode(payload, RobotState, len(skeleton.joints)) for payload in page.states]
             statistics += [decode(payload, Statistics) for payload in page.statistics]
+            if tape is not None:
+                for topic, payloads in ((STATE, page.states), (STATISTICS, page.statistics)):
+                    for payload in payloads:
+                        tape.hear(topic, payload, monotonic_ns())
             if len(states) >= page.total or not page.states:
                 return states, statistics
 
@@ -130,10 +140,11 @@ async def run_remote_cell(
     stop: asyncio.Event,
     show: Callable[[str], None],
     tls: TlsConfig | None = None,
+    folder: Path | None = None,
 ) -> Cell:
     """One cell over a real network. What goes wrong is its result; only an interruption raises TandemError.
 
-    `tls`: this host's keys, for the secure transports.
+    `tls`: this host's keys, for the secure transports. `folder`: of the trial, for the cell's recording.
     """
     reason = why_impossible(key.setup)
     if reason is None and key.setup.transport in SECURE and tls is None:
@@ -143,20 +154,23 @@ async def run_remote_cell(
     slave = [f'track.strategy="{key.setup.strategy}"', f"guard.max_age_s={plan.max_age_s}"]
     config = load_config(example("slave", plan.robot), SlaveConfig, slave)
     settings = {"guard.max_age_s": f"{plan.max_age_s:g}"}
+    tape = open_tape(folder, key, config, settings)
     try:
         async with open_link(LinkConfig(connect=[plan.hosts], tls=tls), ROBOT) as link:
             await link.connected(talk.TALK)
             partner = Partner(link, stop)
             try:
-                course = await _play(plan, key, partner, show, tls)
+                course = await _play(plan, key, partner, show, tls, tape)
             finally:
                 await _farewell(link)
     except TandemError as error:
+        if tape is not None:
+            tape.close(None)
         if stop.is_set():
             raise TandemError("interrupted") from None
         return Cell(key, CellStatus.FAILED, str(error), settings=settings)
     show("judging")
-    return await asyncio.to_thread(judged, key, course, config, settings, ())
+    return await asyncio.to_thread(conclude, key, course, config, settings, (), tape)
 
 
 async def _farewell(link: Link) -> None:
@@ -168,7 +182,12 @@ async def _farewell(link: Link) -> None:
 
 
 async def _play(
-    plan: TrialPlan, key: CellKey, partner: Partner, show: Callable[[str], None], tls: TlsConfig | None
+    plan: TrialPlan,
+    key: CellKey,
+    partner: Partner,
+    show: Callable[[str], None],
+    tls: TlsConfig | None,
+    tape: CellTape | None,
 ) -> CellCourse:
     skeleton = load_skeleton(plan.robot)
     show("starting the robot over there")
@@ -176,8 +195,10 @@ async def _play(
     there = await partner.do(request)
     robot = f"{key.setup.transport}/{robots_host(plan.hosts)}:{there.port}"
     async with _operators_rig(plan, key, robot, tls) as rig:
-        recorder = MessageKeeper()
+        recorder = MessageKeeper(tape)
         rig.observer.listeners.append(recorder.hear)
+        if tape is not None:
+            rig.observer.tapes.append(partial(_hear_operator, tape))
         for name in ("suit", "master"):
             await rig.start(name)
         await rig.until(lambda: rig.observer.command is not None, START_S, "command of the master")
@@ -188,21 +209,27 @@ async def _play(
         await until_all_track([EngageDriver(wanted, PartnerRobot(partner))], check, LOOK_S)
         show(f"following for {plan.seconds:g} s")
         await partner.do(talk.Record())
-        recorder.take()
+        recorder.take(JUDGED)
         for child in rig.children.values():
             child.measure(first=True)
         began_ns, operator = monotonic_ns(), Operator(ROBOT, guard="track")
         await keep_engaged([EngageDriver(operator, PartnerRobot(partner))], plan.seconds, check, LOOK_S)
-        heard = recorder.take()
+        heard = recorder.take(NEITHER)
         answer = await partner.do(talk.EndRecording())
         for child in rig.children.values():
             child.measure()
         cpu = {"master": rig.children["master"].cpu_percent, "slave": answer.cpu_percent}
         show("fetching the robot's messages")
-        states, statistics = await partner.kept(skeleton)
+        states, statistics = await partner.kept(skeleton, tape)
     remarks = tuple(hold_remarks(operator.holds, began_ns))
     judged_time = replace(heard, states=on_masters_clock(states), statistics=[*heard.statistics, *statistics])
     return CellCourse(judged_time, plan.max_age_s, shared_clock=False, cpu_percent=cpu, remarks=remarks)
+
+
+def _hear_operator(tape: CellTape, topic: Topic, payload: bytes, arrived_ns: int) -> None:
+    """The robot's states come from its own host, after the judged time."""
+    if topic.name != STATE.name:
+        tape.hear(topic, payload, arrived_ns)
 
 
 def _check(rig: Rig) -> None:

@@ -17,15 +17,18 @@ from deploy.report.output import writing
 from deploy.sim.network.namespaces import congestion_control
 
 HTML, JSON, CSV = "report.html", "report.json", "cells.csv"
+TASKS_COPY = "tasks.toml"
+"""The weights of the ranking, so that whoever has the folder can compute it again."""
 
 
 def write(folder: Folder, tasks: Path = TASKS) -> Findings:
-    """Write the three files. Raises TandemError where the disk does not let them."""
+    """Write the three files and a copy of the tasks. Raises TandemError where the disk does not let them."""
     f, about = find(folder, tasks), _about()
     texts = {
         HTML: as_html(f, plots(f.rows), about),
         JSON: as_json(tree(f, about)),
         CSV: as_csv(cell for row in f.rows for cell in row.cells),
+        TASKS_COPY: tasks.read_text("utf-8"),
     }
     for name, text in texts.items():
         with writing(folder.path / name):
@@ -35,7 +38,7 @@ def write(folder: Folder, tasks: Path = TASKS) -> Findings:
 
 def _about() -> dict[str, str]:
     now = datetime.datetime.now(datetime.UTC)
-    return {
+    about = {
         "written": now.strftime("%Y-%m-%d %H:%M UTC"),
         "tandem": version("tandem"),
         "zenoh": version("eclipse-zenoh"),
@@ -45,3 +48,4 @@ def _about() -> dict[str, str]:
             f"tcp, tls, ws: {congestion_control()}, set on both emulated hosts; quic: Zenoh's own; udp: none"
         ),
     }
+    return dict(sorted(about.items()))  # as `report.json` has them

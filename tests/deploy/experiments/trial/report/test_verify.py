@@ -23,7 +23,7 @@ def copy(whole: Path, tmp_path: Path) -> Path:
 
 
 def test_every_table_is_what_the_cells_give(copy: Path) -> None:
-    assert differences(Folder(copy)) == []
+    assert differences(Folder(copy)).differences == []
     shown = CliRunner().invoke(cli.app, ["trial", "verify", str(copy)])
     assert shown.exit_code == 0, shown.output
     assert "it is not sealed" in shown.output
@@ -35,7 +35,7 @@ def test_a_changed_figure_of_the_report_is_named(copy: Path) -> None:
     figure = next(iter(report["compared"]["setups"][setup]["figures"]))
     report["compared"]["setups"][setup]["figures"][figure]["median"] += 1.0
     (copy / "report.json").write_text(json.dumps(report))
-    assert differences(Folder(copy)) == [
+    assert differences(Folder(copy)).differences == [
         f"report.json: compared.setups.{setup}.figures.{figure}.median is not what the cells give"
     ]
 
@@ -43,9 +43,9 @@ def test_a_changed_figure_of_the_report_is_named(copy: Path) -> None:
 def test_a_changed_line_of_the_table_and_a_changed_cell_are_named(copy: Path) -> None:
     lines = (copy / "cells.csv").read_text().splitlines()
     (copy / "cells.csv").write_text("\n".join([*lines[:2], lines[2] + "0", *lines[3:]]) + "\n")
-    assert differences(Folder(copy)) == ["cells.csv: line 3 is not what the cells give"]
+    assert differences(Folder(copy)).differences == ["cells.csv: line 3 is not what the cells give"]
     (copy / "cells.csv").write_text("\n".join(lines[:-1]) + "\n")
-    assert differences(Folder(copy)) == [
+    assert differences(Folder(copy)).differences == [
         f"cells.csv: has {len(lines) - 1} lines, the cells give {len(lines)}"
     ]
 
@@ -64,3 +64,21 @@ def test_a_folder_without_a_report_says_so(copy: Path) -> None:
     (copy / "report.json").unlink()
     with pytest.raises(TandemError, match="no report that can be read"):
         differences(Folder(copy))
+
+
+def test_a_changed_line_of_the_page_is_named_and_another_drawing_of_a_plot_is_not(copy: Path) -> None:
+    page = copy / "report.html"
+    lines = page.read_text("utf-8").splitlines()
+    number = next(i for i, line in enumerate(lines) if "<td" in line and "ms" not in line)
+    page.write_text("\n".join([*lines[:number], lines[number] + "9", *lines[number + 1 :]]) + "\n", "utf-8")
+    assert differences(Folder(copy)).differences == [
+        f"report.html: line {number + 1} is not what the cells give"
+    ]
+    page.write_text("\n".join(lines).replace('src="data:image/svg', 'src="data:image/other') + "\n", "utf-8")
+    assert differences(Folder(copy)).differences == []
+
+
+def test_the_ranking_uses_the_weights_that_lie_in_the_folder(copy: Path) -> None:
+    tasks = copy / "tasks.toml"
+    tasks.write_text(tasks.read_text("utf-8").replace("weight = ", "weight = 1", 1), "utf-8")
+    assert any("compared.rankings" in words for words in differences(Folder(copy)).differences)
