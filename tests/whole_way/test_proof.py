@@ -38,8 +38,8 @@ def proof(network: str, *plant: str) -> tuple[dict[str, ProofRow], float]:
 def true_delay_ms(operator: AngularSpeed, robot: AngularSpeed) -> float:
     """By another way than the estimator's: the shift of least squares of the noise-free speeds.
 
-    Over the same windows and of the same band: prediction over a long line makes the delay of one stretch, and
-    that of slow and of fast motion, differ by some ms.
+    Over the same windows and of the same band: prediction over a long line makes the delay of one stretch,
+    and that of slow and of fast motion, differ by some ms.
     """
     origin = operator.at_ns[0]
     end_ms = float(operator.at_ns[-1] - origin) / NS_PER_MS
