@@ -64,6 +64,7 @@ class Master:
     ) -> None:
         """`tap`: hands what this process hears, decides and sends to local readers; None: there is none."""
         self._config = config
+        self._session = session
         self._notifier = notifier or Notifier()
         self._pipeline = MasterPipeline(config, SuitProtocol.load(config.capture.dbc))
         self._calls: Pipeline = self._pipeline
@@ -227,6 +228,7 @@ class Master:
         return MasterMetrics(
             software=software(),
             operator=self._config.operator.name,
+            paths=self._session.paths,
             heap=heap_in_use(),
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
             stages_ms=self._stages.summary(),

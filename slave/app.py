@@ -262,6 +262,7 @@ class Slave:
             servos=servo_metrics(self._servos, self._config),
             video=self._camera.metrics() if self._camera else None,
             link=self._link.counters(),
+            paths=self._link.paths,
         )
 
 

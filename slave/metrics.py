@@ -26,6 +26,7 @@ def slave_metrics(
     servos: ServoMetrics,
     video: CameraMetrics | None,
     link: dict[str, TopicCounters],
+    paths: str = "",
 ) -> SlaveMetrics:
     """The pipeline's own figures, with those of the loop and the devices around it."""
     guard, traffic = pipeline.guard, pipeline.traffic
@@ -50,6 +51,7 @@ def slave_metrics(
         servos=servos,
         video=video,
         link=link,
+        paths=paths,
         contact_from="" if pipeline.contact.missing(now_ns) else pipeline.contact.dull,
         times=guard.times.metrics(),
     )

@@ -15,7 +15,7 @@ from common.link.declared import Declarations, Declare
 from common.link.inbox import Inbox, OrderedInbox
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
-from common.link.waiting import count_peers, is_matching, wait_for_peer
+from common.link.waiting import count_peers, is_matching, paths_in_words, wait_for_peer
 from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
 from common.wire.presence import ProcessPresence, present
@@ -209,6 +209,11 @@ class Link:
     def counters(self) -> dict[str, TopicCounters]:
         """A copy of the counters, by topic name."""
         return {name: replace(counters) for name, counters in self._counters.items()}
+
+    @property
+    def paths(self) -> str:
+        """Of two paths, which one does not carry and why; empty where both do, or where there is one."""
+        return "" if self._closed else paths_in_words(self._declared.session)
 
     @property
     def peers(self) -> int:

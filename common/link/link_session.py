@@ -17,7 +17,7 @@ from common.link.inbox import Inbox, wake
 from common.link.link import Link, Overheard
 from common.link.presence import watch_operators, watch_presence
 from common.link.roster import MOST_ROBOTS, Roster
-from common.link.waiting import count_peers
+from common.link.waiting import count_peers, paths_in_words
 from common.metrics.link import TopicCounters
 from common.wire.instance import draw_instance
 from common.wire.presence import ROBOT_NAME, OperatorPresence, ProcessPresence, place
@@ -151,6 +151,11 @@ class LinkSession:
             else:
                 self.refused = refused
                 return
+
+    @property
+    def paths(self) -> str:
+        """Of two paths, which one does not carry and why; empty where both do, or where there is one."""
+        return "" if self._closed else paths_in_words(self._declared.session)
 
     @property
     def peers(self) -> int:

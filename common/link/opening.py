@@ -9,13 +9,11 @@ import math
 import re
 import threading
 from collections.abc import Callable
-from typing import cast
 
 import zenoh
 
 from common.errors import LinkError
 from common.link.config import LinkConfig
-from common.link.twin_session import TwinSession
 from common.link.zenoh_config import zenoh_configuration
 
 RETRY_S = 0.5
@@ -31,26 +29,6 @@ _NOT_YET = re.compile(
 """Of an endpoint that this host may have a little later: an interface that is not up, a name without DNS."""
 
 log = logging.getLogger(__name__)
-
-
-async def open_paths(
-    config: LinkConfig,
-    mode: str = "",
-    within_s: float = math.inf,
-    waits: Callable[[str], None] = lambda _: None,
-    revoked: frozenset[str] = frozenset(),
-) -> zenoh.Session:
-    """As `open_zenoh`; with `[link.twin]` two sessions that stand as one."""
-    first = await open_zenoh(config, mode, within_s, waits, revoked)
-    if config.second is None:
-        return first
-    try:
-        second = await open_zenoh(config.second, mode, within_s, waits, revoked)
-    except BaseException:
-        threading.Thread(target=_close, args=(first,), name="link-close", daemon=True).start()
-        raise
-    # it has what a link uses of a session
-    return cast("zenoh.Session", TwinSession(first, second))
 
 
 async def open_zenoh(
@@ -109,11 +87,12 @@ async def _open_off_the_loop(tree: dict[str, object]) -> zenoh.Session:
     try:
         return await asyncio.shield(opening)
     except asyncio.CancelledError:
-        opening.add_done_callback(_close_unwanted)
+        opening.add_done_callback(close_unwanted)
         raise
 
 
-def _close_unwanted(opening: asyncio.Future[zenoh.Session]) -> None:
+def close_unwanted(opening: asyncio.Future[zenoh.Session]) -> None:
+    """Close a session that has opened and that nobody uses; one that did not open needs nothing."""
     if not opening.cancelled() and opening.exception() is None:
         # this is called on the loop, and to close can take ten seconds
         threading.Thread(target=_close, args=(opening.result(),), name="link-close", daemon=True).start()

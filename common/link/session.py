@@ -16,7 +16,7 @@ from common.link.config import LinkConfig
 from common.link.congestion import check_congestion_control, set_congestion_control
 from common.link.link import Link
 from common.link.link_session import LinkSession, check_robot_name
-from common.link.opening import open_paths
+from common.link.paths import open_paths
 from common.link.revoked import RevocationFile
 from common.link.revoking import heeding
 

@@ -15,10 +15,12 @@ import struct
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import zenoh
 from zenoh.handlers import Callback
 
+Part = TypeVar("Part", covariant=True)
 NUMBER = struct.Struct("<QQ")
 """Sender and number."""
 MOST_SENDERS = 256
@@ -56,36 +58,57 @@ class FirstArrivals:
             return first
 
 
-class TwinPublisher:
-    """Puts each payload on both paths."""
+class Held(Protocol[Part]):
+    """Something that is declared on every path that is open (`twin_session.OnPaths`)."""
 
-    def __init__(self, publishers: list[zenoh.Publisher]) -> None:
+    @property
+    def each(self) -> tuple[Part, ...]:
+        """What holds it on each path."""
+
+    def on(self, path: int) -> Part:
+        """What holds it on that path."""
+
+    def undeclare(self) -> None:
+        """On every path."""
+
+
+class TwinPublisher:
+    """Puts each payload on every path that is open."""
+
+    def __init__(
+        self,
+        publishers: Held[zenoh.Publisher],
+        declare: Callable[[Callable[[int, zenoh.Session], object]], Held[object]],
+    ) -> None:
+        """`declare`: of the session, for what listens to this publisher."""
         self._publishers = publishers
+        self._declare = declare
         self._sender, self._number = secrets.randbits(64), 0
 
     def put(self, payload: bytes) -> None:
         """Put it; raises what the last path raised where none took it."""
         self._number += 1
         attachment, failed = NUMBER.pack(self._sender, self._number), []
-        for publisher in self._publishers:
+        publishers = self._publishers.each
+        for publisher in publishers:
             try:
                 publisher.put(payload, attachment=attachment)
             except zenoh.ZError as error:
                 failed.append(error)
-        if len(failed) == len(self._publishers):
+        if len(failed) == len(publishers):
             raise failed[-1]
 
     @property
     def matching_status(self) -> bool:
-        """Whether anybody subscribes, on either path."""
-        statuses = (publisher.matching_status for publisher in self._publishers)
+        """Whether anybody subscribes, on any path."""
+        statuses = (publisher.matching_status for publisher in self._publishers.each)
         return any(bool(getattr(status, "matching", status)) for status in statuses)
 
-    def declare_matching_listener(self, changed: Callback[zenoh.MatchingStatus]) -> TwinHeld:
-        """Tell when that changes: `changed` gets this publisher, which knows both paths."""
+    def declare_matching_listener(self, changed: Callback[zenoh.MatchingStatus]) -> Held[object]:
+        """Tell when that changes: `changed` gets this publisher, which knows all paths."""
         callback: Callable[..., object] = changed.callback
         both: Callback[zenoh.MatchingStatus] = Callback(lambda _: callback(self), indirect=False)
-        return TwinHeld([publisher.declare_matching_listener(both) for publisher in self._publishers])
+        return self._declare(lambda path, _: self._publishers.on(path).declare_matching_listener(both))
 
     @property
     def matching(self) -> bool:
@@ -93,23 +116,8 @@ class TwinPublisher:
         return self.matching_status
 
     def undeclare(self) -> None:
-        """On both paths."""
-        for publisher in self._publishers:
-            publisher.undeclare()
-
-
-class TwinHeld:
-    """What is declared on both paths."""
-
-    def __init__(self, held: list[object]) -> None:
-        self._held = held
-
-    def undeclare(self) -> None:
-        """On both."""
-        for each in self._held:
-            undeclare = getattr(each, "undeclare", None)
-            if undeclare is not None:
-                undeclare()
+        """On every path."""
+        self._publishers.undeclare()
 
 
 class TwinQuery:
@@ -196,14 +204,16 @@ class TwinQuestions:
 
 
 class TwinAnswers:
-    """The answers of both paths to one question, each once; the end when both have ended."""
+    """The answers of all paths to one question, each once; the end when all have ended."""
 
-    def __init__(self, on_reply: Callable[[zenoh.Reply], object], on_end: Callable[[], object]) -> None:
+    def __init__(
+        self, on_reply: Callable[[zenoh.Reply], object], on_end: Callable[[], object], paths: int
+    ) -> None:
         self._on_reply = on_reply
         self._on_end = on_end
         self._seen: set[bytes] = set()
         self._refused: list[zenoh.Reply] = []
-        self._open = 2
+        self._open = paths
         self._lock = threading.Lock()
 
     def reply(self, reply: zenoh.Reply) -> None:

@@ -16,6 +16,12 @@ def count_peers(session: zenoh.Session) -> int:
     return len(session.info.transports())
 
 
+def paths_in_words(session: zenoh.Session) -> str:
+    """Which of two paths does not carry; empty where both do, none does, or where there is one."""
+    words: str = getattr(session, "words", "")
+    return words
+
+
 async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: float) -> None:
     """Until another session is connected and, where a key is given, one that answers it.
 

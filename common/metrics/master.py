@@ -113,6 +113,8 @@ class MasterMetrics(Metrics):
     robots: dict[str, CommandedMetrics]
     access: AccessMetrics | None = None
     """In the file at the end only."""
+    paths: str = ""
+    """Of two paths, which one does not carry and why; see `[link.twin]`."""
     zero_pose_again: ZeroPoseTaken | None = None
     arm_load: dict[str, ArmLoad] = field(default_factory=dict)
     """By arm."""

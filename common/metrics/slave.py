@@ -183,5 +183,7 @@ class SlaveMetrics(Metrics):
     contact_from: str = ""
     """Below which force no push is noticed, by segment, in words; empty where none is at all."""
     times: GuardTimes | None = None
+    paths: str = ""
+    """Of two paths, which one does not carry and why; see `[link.twin]`."""
     access: AccessMetrics | None = None
     """In the file at the end only."""

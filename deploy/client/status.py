@@ -129,6 +129,8 @@ class RobotStatus:
     """What a joint's drive lacks that it may lack, in words."""
     not_driven: dict[str, str] = field(default_factory=dict)
     """Joints without a servo, in words."""
+    paths: tuple[str, ...] = ()
+    """Of two paths, which one does not carry, as the robot and the operator's host see it."""
 
 
 def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> RobotStatus:
@@ -175,7 +177,13 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         unlimited=metrics.servos.unlimited if metrics else "",
         left_out=metrics.servos.left_out if metrics else {},
         not_driven=metrics.servos.not_driven if metrics else {},
+        paths=_paths(heard),
     )
+
+
+def _paths(heard: Heard) -> tuple[str, ...]:
+    sides = {"robot": heard.metrics, "operator": heard.master}
+    return tuple(f"{side}: {one.paths}" for side, one in sides.items() if one is not None and one.paths)
 
 
 def _not_heard(heard: Heard) -> int | None:

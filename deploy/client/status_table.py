@@ -57,6 +57,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
         missing = f"{due.missing} of {due.expected} commands were not there when they were due"
         p99, corrected = (_number(_p99(of), 1) for of in (latency.one_way, latency.one_way_corrected))
         words.append((f"{missing} (one way p99 {p99} ms, {corrected} ms with them)", "yellow"))
+    words += [(f"one path of two: {lacking}", "yellow") for lacking in one.paths]
     words += clock_words(one.clocks)
     if one.blind is not None:
         words.append((one.blind, ""))

@@ -1,4 +1,7 @@
-"""Two paths to a real robot process: while one is cut the robot follows on; with one path it holds."""
+"""Two paths to a real robot process: while one is cut the robot follows on; with one path it holds.
+
+A path whose address the robot's host does not have holds up neither an engage nor a stop.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from common.clock import monotonic_ns, to_ns
+from common.clock import monotonic_ns, to_ns, to_s
+from common.wire.messages import Action
 from deploy.harness.endpoints import free_port
 from deploy.harness.host import HostWatch
 from deploy.harness.rig import Rig, open_rig
@@ -17,6 +21,8 @@ from tests.tcp_path import TcpPath
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
+NOWHERE = "tcp/192.0.2.1:7447"
+"""An address for documentation (RFC 5737): no host has it."""
 CUT_S = 1.5
 """Longer than any guard waits, and than Zenoh takes to give up a path."""
 
@@ -67,5 +73,30 @@ def test_a_cut_path_makes_the_robot_hold_where_it_is_the_only_one(on_this_host: 
         seen, duplicates = await states_while_cut(twin=False)
         assert "hold" in seen
         assert duplicates == 0
+
+    on_this_host(story)
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("first", [False, True], ids=["second path missing", "first path missing"])
+def test_a_robot_whose_modem_never_comes_up_engages_and_stops_at_once(
+    on_this_host: OnThisHost, first: bool
+) -> None:
+    async def story(_: HostWatch) -> None:
+        slave: list[str] = []
+        async with open_rig("tcp", overrides={"slave": slave}) as rig:
+            own = ", ".join(f'"{end}"' for end in rig.endpoints.listening(0))
+            ends = [f'"{NOWHERE}"', own] if first else [own, f'"{NOWHERE}"']
+            slave += [f"link.listen=[{ends[0]}]", f"link.twin.listen=[{ends[1]}]"]
+            await start_tracking(rig)
+            begun_ns = monotonic_ns()
+            reply = await rig.control(Action.ESTOP)
+            took_s = to_s(monotonic_ns() - begun_ns)
+            assert reply.done
+            assert took_s < 1.0
+            await rig.until(lambda: rig.observer.slave is not None, 5.0, "statistics", rig.check)
+            assert rig.observer.slave is not None
+            assert NOWHERE in rig.observer.slave.paths
+            assert set((await rig.stop()).values()) == {0}
 
     on_this_host(story)

@@ -33,6 +33,8 @@ class FakeLink:
 
 
 class FakeSession:
+    paths = ""
+
     def link(self, _: str) -> FakeLink:
         return FakeLink()
 

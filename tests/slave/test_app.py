@@ -31,6 +31,8 @@ LIMIT_NM = np.stack([np.full(25, -1.0), np.full(25, 1.0)])
 
 
 class FakeLink:
+    paths = ""
+
     def __init__(self) -> None:
         self.put: dict[str, int] = {}
 

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import socket
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import pytest
 import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.link import Link, open_session
+from common.errors import LinkError
+from common.link import Link, open_session, opening
 from common.link.config import LinkConfig, TwinConfig
 from common.link.inbox import Inbox
 from common.link.twin import NUMBER, FirstArrivals, TwinQuestions
 from common.link.twin_session import TwinTokens
 from common.metrics.link import TopicCounters
-from common.wire.topics import COMMAND, CONTROL, IN_ORDER, STATE, VIDEO
+from common.wire.topics import COMMAND, CONTROL, IN_ORDER, STATE, STOP, VIDEO
 from deploy.harness.endpoints import free_port
 from tests.tcp_path import TcpPath
 
@@ -305,3 +309,112 @@ def test_an_older_message_of_one_path_never_replaces_a_newer_one_of_the_other() 
     loop.run_until_complete(story())
     loop.close()
     assert heard[-1] == b"6"
+
+
+class PathAppears:
+    """Stands in for a modem: until `here`, the host has no address for the second path."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, missing: str) -> None:
+        self.here = False
+        really = opening._open_off_the_loop
+
+        async def attempt(tree: dict[str, Any]) -> zenoh.Session:
+            if missing in json.dumps(tree["listen"]) and not self.here:
+                raise zenoh.ZError(f"{missing}: Cannot assign requested address (os error 99)")
+            return await really(tree)
+
+        monkeypatch.setattr(opening, "_open_off_the_loop", attempt)
+        monkeypatch.setattr(opening, "RETRY_S", 0.01)
+        monkeypatch.setattr(opening, "MOST_RETRY_S", 0.01)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("missing", [0, 1])
+def test_a_robot_without_one_of_its_paths_answers_at_once_and_takes_the_path_up_later(
+    monkeypatch: pytest.MonkeyPatch, missing: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def story() -> None:
+        ports = free_port("tcp"), free_port("tcp")
+        listen = [f"tcp/127.0.0.1:{port}" for port in ports]
+        modem = PathAppears(monkeypatch, listen[missing])
+        robot = LinkConfig(listen=listen[:1], twin=TwinConfig(listen=listen[1:]))
+        operator = LinkConfig(connect=listen[:1], twin=TwinConfig(connect=listen[1:]))
+        async with open_session(robot) as there:
+            asked: list[bytes] = []
+
+            def answer(payload: bytes, _: int) -> bytes:
+                asked.append(payload)
+                return b"stopped"
+
+            there.link(ROBOT).answer(STOP, answer)
+            put_state = there.link(ROBOT).publish(STATE)
+            heard: list[bytes] = []
+            there.link(ROBOT).subscribe(COMMAND, lambda payload, _: heard.append(payload))
+            assert listen[missing] in there.paths
+            assert "os error 99" in there.paths
+            async with open_session(LinkConfig(connect=[listen[1 - missing]])) as one_path:
+                alone = one_path.link(ROBOT)
+                await alone.connected(STOP)
+                assert await alone.ask(STOP, b"stop") == b"stopped"
+            modem.here = True
+            await until(lambda: not there.paths)
+            async with open_session(operator) as here:
+                link = here.link(ROBOT)
+                states: list[bytes] = []
+                link.subscribe(STATE, lambda payload, _: states.append(payload))
+                put = link.publish(COMMAND.of("nurse-1"))
+                await link.connected(STOP)
+                assert await link.ask(STOP, b"again") == b"stopped"
+                await until(lambda: put(b"1") or heard)
+                # what was declared before the path came is on that path too: each comes twice, counts once
+                await until(lambda: put(b"2") or there.link(ROBOT).counters()[COMMAND.name].duplicates)
+                await until(lambda: put_state(b"s") or link.counters()[STATE.name].duplicates)
+            assert asked == [b"stop", b"again"]
+
+    with caplog.at_level("INFO"):
+        asyncio.run(story())
+    assert "both paths are in use" in caplog.text
+
+
+def test_a_path_that_comes_after_the_session_was_closed_is_closed_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def story() -> None:
+        listen = [f"tcp/127.0.0.1:{free_port('tcp')}" for _ in range(2)]
+        PathAppears(monkeypatch, listen[1])
+        async with open_session(LinkConfig(listen=listen[:1], twin=TwinConfig(listen=listen[1:]))) as session:
+            assert session.paths
+        left = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
+        if left:
+            await asyncio.wait(left, timeout=5.0)
+        assert all(task.done() for task in left), "nobody looks for the path any more"
+
+    asyncio.run(story())
+
+
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_what_no_waiting_mends_is_said_at_the_start(wrong: int) -> None:
+    async def story() -> None:
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            listen = [f"tcp/127.0.0.1:{free_port('tcp')}"] * 2
+            listen[wrong] = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+            config = LinkConfig(listen=listen[:1], twin=TwinConfig(listen=listen[1:]))
+            with pytest.raises(LinkError, match="cannot be opened"):
+                async with open_session(config):
+                    pass
+
+    asyncio.run(story())
+
+
+def test_without_either_path_it_waits_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def story() -> None:
+        PathAppears(monkeypatch, "127.0.0.1")
+        waited: list[str] = []
+        listen = [f"tcp/127.0.0.1:{free_port('tcp')}" for _ in range(2)]
+        config = LinkConfig(listen=listen[:1], twin=TwinConfig(listen=listen[1:]))
+        with pytest.raises(LinkError, match="within 0"):
+            async with open_session(config, router_within_s=0.05, waits=waited.append):
+                pass
+        assert any(listen[0] in words for words in waited)
+
+    asyncio.run(story())

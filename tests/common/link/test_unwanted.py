@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from common.link.opening import _close_unwanted
+from common.link.opening import close_unwanted
 
 
 class Hangs:
@@ -35,7 +35,7 @@ def test_a_close_that_hangs_holds_neither_the_loop_nor_the_process() -> None:
     session = Hangs()
 
     async def story() -> None:
-        _close_unwanted(await opened(session))
+        close_unwanted(await opened(session))
         assert not session.closed.is_set()
 
     asyncio.run(story())
@@ -52,7 +52,7 @@ def test_what_never_opened_needs_no_closing(cancelled: bool) -> None:
             future.cancel()
         else:
             future.set_exception(ValueError("no endpoint"))
-        _close_unwanted(future)
+        close_unwanted(future)
 
     before = threading.active_count()
     asyncio.run(story())

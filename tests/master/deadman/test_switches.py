@@ -51,6 +51,8 @@ class Link:
 
 
 class Session:
+    paths = ""
+
     def __init__(self) -> None:
         self.links = {name: Link() for name in ROBOTS}
 

@@ -24,6 +24,8 @@ NOW_NS = 10_000_000_000
 
 
 class FakeLink:
+    paths = ""
+
     def __init__(self) -> None:
         self.states: list[bytes] = []
 
