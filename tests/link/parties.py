@@ -74,10 +74,10 @@ def free_port(transport: str) -> int:
         return int(probe.getsockname()[1])
 
 
-def link_toml(keys: Path, who: str, head: str) -> str:
+def link_toml(keys: Path, who: str, head: str, access: str = ACCESS) -> str:
     return (
         f'[link]\n{head}\n[link.tls]\nca = "{keys}/ca.pem"\ncertificate = "{keys}/{who}.pem"\n'
-        f'key = "{keys}/{who}.key"\n{ACCESS}'
+        f'key = "{keys}/{who}.key"\n{access}'
     )
 
 

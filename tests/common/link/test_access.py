@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import random
+from fnmatch import fnmatchcase
+
 import pytest
 import zenoh
 
-from common.link.access import AccessControl, access_control, named, operators_of
+from common.link.access import AccessControl, access_control, named, operators_of, robot_chunk
 from common.link.config import AccessConfig
 from common.wire.presence import ProcessPresence
 
@@ -124,7 +128,14 @@ def test_a_pattern_stands_for_the_listed_robots() -> None:
         for name in ("anna", "ben"):
             key = f"tandem/{robot}/operator/{name}/command"
             assert may(f"operator:{name}", "put", key, table=rules) == (name in by)
-    assert not may("operator:ben", "put", "tandem/other/operator/ben/command", table=rules)
+    for robot, by in (("other", "ben"), ("home-1", "anna"), ("ward-1/x", "anna")):
+        key = f"tandem/{robot}/operator/{by}/command"
+        received = {
+            who for who in [*named(access), f"robot:{robot}"] if may(who, "put", key, "egress", rules)
+        }
+        heard = {who for who in received if who.startswith("robot:")}
+        sent = may(f"operator:{by}", "put", key, table=rules)
+        assert not (sent and heard), "a robot that is not listed hears nobody, also where a pattern fits it"
     assert operators_of(access, "ward-2") == {"anna", "ben"}
     assert access.mistakes() == []
 
@@ -132,3 +143,45 @@ def test_a_pattern_stands_for_the_listed_robots() -> None:
 def test_a_pattern_of_no_listed_robot_is_a_mistake() -> None:
     (mistake,) = AccessConfig(robots=["home-1"], operators={"anna": ["ward-*", "home-*"]}).mistakes()
     assert (mistake.key, mistake.value) == ("link.access.operators.anna", "ward-*")
+
+
+def test_a_pattern_in_a_key_fits_the_names_that_it_fits_in_the_file() -> None:
+    draw = random.Random(14)
+    fitting = 0
+    for _ in range(4000):
+        pattern = draw.choice("ab*") + "".join(draw.choices("ab-.*", k=draw.randrange(6)))
+        name = draw.choice("ab") + "".join(draw.choices("ab-.", k=draw.randrange(6)))
+        key = zenoh.KeyExpr(f"tandem/{robot_chunk(pattern)}/state")
+        fits = fnmatchcase(name, pattern)
+        fitting += fits
+        assert key.includes(zenoh.KeyExpr(f"tandem/{name}/state")) == fits, (pattern, name)
+        assert not key.includes(zenoh.KeyExpr(f"tandem/{name}/{name}/state"))
+    assert fitting > 400
+
+
+def size(robots: int, nurses: int) -> int:
+    """Bytes of Zenoh's rules for so many robots, and nurses who each command the ward `robot-*`."""
+    access = AccessConfig(
+        robots=[f"robot-{i:04}" for i in range(robots)],
+        operators={f"nurse-{i:04}": ["robot-*", "home-*"] for i in range(nurses)},
+        routers=["hub"],
+    )
+    return len(json.dumps(access_control(access)))
+
+
+def test_the_rules_grow_with_robots_plus_nurses() -> None:
+    for_robots, for_nurses = size(1000, 1) - size(1, 1), size(1, 50) - size(1, 1)
+    product = size(1000, 50) - size(1, 1) - for_robots - for_nurses
+    # the numbers in the rules' names grow longer
+    assert abs(product) < 0.01 * size(1000, 50)
+    assert size(1000, 50) < 3_000_000
+
+
+def test_an_overlapping_pattern_adds_nothing_and_a_revoked_nurse_of_a_group_may_nothing() -> None:
+    access = AccessConfig(robots=["ward-1"], operators={"anna": ["*", "ward-*"], "ben": ["ward-*", "*"]})
+    rules = access_control(access, frozenset({"operator:ben"}))
+    key = "tandem/ward-1/operator/anna/command"
+    assert [key for rule in rules["rules"] for key in rule["key_exprs"] if "ward-$*" in key] == []
+    assert may("operator:anna", "put", key, table=rules)
+    assert not may("operator:ben", "put", "tandem/ward-1/operator/ben/command", table=rules)
+    assert not may("operator:ben", "declare_subscriber", "tandem/ward-1/state", table=rules)
