@@ -25,6 +25,8 @@ from common.wire.topics import SUMMARY, Topic
 from common.wire.version import installed
 
 CLOSE_TIMEOUT_S = 1.0
+REPLACED_S = 0.1
+"""For a session that leads nowhere while another is open: its closing may last as long as its attempts."""
 REOPEN_S = 0.5
 """Between two attempts to open the session anew."""
 OpenAgain = Callable[[frozenset[str]], Awaitable[zenoh.Session]]
@@ -60,6 +62,8 @@ class LinkSession:
         self._loop = loop
         self._links: dict[str, Link] = {}
         self._closed = False
+        self._moving = asyncio.Lock()
+        """Held by who puts another Zenoh session in the place of this one."""
         self.overheard: Overheard | None = None
         """Told of each message of the links that are made from now on."""
 
@@ -140,17 +144,35 @@ class LinkSession:
 
         It ends when the new session is open: what is published until then is lost, questions fail.
         """
-        refused = self.revoked
-        await self._close_in_time(CLOSE_TIMEOUT_S)
-        while True:
-            try:
-                self._declared.move(await open_again(refused))
-            except (LinkError, zenoh.ZError) as error:
-                log.warning("the link is closed: %s; trying again", error)
-                await asyncio.sleep(REOPEN_S)
-            else:
-                self.refused = refused
-                return
+        async with self._moving:
+            refused = self.revoked
+            await self._close_in_time(CLOSE_TIMEOUT_S)
+            while True:
+                try:
+                    self._declared.move(await open_again(refused))
+                except (LinkError, zenoh.ZError) as error:
+                    log.warning("the link is closed: %s; trying again", error)
+                    await asyncio.sleep(REOPEN_S)
+                else:
+                    self.refused = refused
+                    return
+
+    async def replace(
+        self, opened: zenoh.Session, refused: frozenset[str], needed: Callable[[], bool] = lambda: True
+    ) -> bool:
+        """Go on in a session that is open already and refuses these names; the former one is closed first.
+
+        False, and the new one is closed, where it is not `needed` any more.
+        """
+        before = self._declared.session
+        async with self._moving:
+            if self._closed or self._declared.session is not before or not needed():
+                await self._close_in_time(CLOSE_TIMEOUT_S, opened)
+                return False
+            await self._close_in_time(REPLACED_S)
+            self._declared.move(opened)
+            self.refused = refused
+            return True
 
     @property
     def paths(self) -> str:
@@ -174,10 +196,12 @@ class LinkSession:
             link.close()
         return await self._close_in_time(timeout_s)
 
-    async def _close_in_time(self, timeout_s: float) -> bool:
+    async def _close_in_time(self, timeout_s: float, session: zenoh.Session | None = None) -> bool:
+        """Close a session, by itself the one that is in use."""
         closed: asyncio.Future[None] = self._loop.create_future()
+        ended = session or self._declared.session
         threading.Thread(
-            target=self._close_session, args=(self._declared.session, closed), name="link-close", daemon=True
+            target=self._close_session, args=(ended, closed), name="link-close", daemon=True
         ).start()
         done, _ = await asyncio.wait({closed}, timeout=timeout_s)
         if not done:

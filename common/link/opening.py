@@ -20,6 +20,8 @@ RETRY_S = 0.5
 MOST_RETRY_S = 5.0
 """Between two attempts, which begin RETRY_S apart and grow rarer."""
 BACK_OFF = 1.5
+PATIENT, MOST_PATIENT_S = 3.0, 10.0
+"""An attempt in the second of two rounds over the routers may last longer: perhaps the line is slow."""
 _RUST_PLACE = re.compile(r"[!.]?\s+at \S+\.rs:\d+\.?")
 _NO_ROUTER = "Unable to connect to any of"
 _NOT_YET = re.compile(
@@ -46,7 +48,8 @@ async def open_zenoh(
     pause_s = RETRY_S
     while True:
         try:
-            return await _open_off_the_loop(zenoh_configuration(_in_turn(config, turn), mode, revoked))
+            trying = in_turn(config, turn, patient=math.isinf(within_s))
+            return await _open_off_the_loop(zenoh_configuration(trying, mode, revoked))
         except zenoh.ZError as error:
             words = _RUST_PLACE.sub("", str(error))
         missing = _missing(config, words)
@@ -73,12 +76,25 @@ def _missing(config: LinkConfig, words: str) -> str | None:
     return None
 
 
-def _in_turn(config: LinkConfig, turn: int) -> LinkConfig:
-    """Another endpoint first each time: a client whose first router is dead does not try the second."""
+def in_turn(config: LinkConfig, turn: int, patient: bool = True) -> LinkConfig:
+    """What a client tries in its turn: each endpoint first once a round, as it never tries the second itself.
+
+    `patient`: every second round lasts longer, so that a line which is slower than `open_timeout_s` is
+    opened too.
+    """
     if config.mode != "client":
         return config
-    first = turn % len(config.connect)
-    return config.model_copy(update={"connect": [*config.connect[first:], *config.connect[:first]]})
+    rounds, first = divmod(turn, len(config.connect))
+    changed: dict[str, object] = {"connect": [*config.connect[first:], *config.connect[:first]]}
+    if patient and rounds % 2:
+        slow_s = min(MOST_PATIENT_S, PATIENT * config.open_timeout_s)
+        changed["open_timeout_s"] = max(config.open_timeout_s, slow_s)
+    return config.model_copy(update=changed)
+
+
+async def open_once(config: LinkConfig, revoked: frozenset[str] = frozenset()) -> zenoh.Session:
+    """One attempt, without waiting for anything. Raises ZError; if cancelled, the session is closed."""
+    return await _open_off_the_loop(zenoh_configuration(config, "", revoked))
 
 
 async def _open_off_the_loop(tree: dict[str, object]) -> zenoh.Session:

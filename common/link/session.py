@@ -14,6 +14,7 @@ from common.errors import LinkError
 from common.link.certificates import check_keys
 from common.link.config import LinkConfig
 from common.link.congestion import check_congestion_control, set_congestion_control
+from common.link.failover import failing_over
 from common.link.link import Link
 from common.link.link_session import LinkSession, check_robot_name
 from common.link.paths import open_paths
@@ -52,7 +53,7 @@ async def open_session(
         return await open_paths(config, mode, math.inf, waits, refused)
 
     try:
-        async with heeding(session, revocations, open_again):
+        async with heeding(session, revocations, open_again), failing_over(session, config):
             yield session
     finally:
         await session.close()

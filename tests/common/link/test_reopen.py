@@ -89,3 +89,28 @@ def test_between_two_sessions_what_is_put_is_counted_as_not_sent() -> None:
             assert link.counters()["state"].sent == 1
 
     run(test)
+
+
+def test_a_session_that_leads_nowhere_is_replaced_and_one_that_is_not_needed_is_closed() -> None:
+    async def test() -> None:
+        endpoint = free_endpoint()
+        listening = LinkConfig(listen=[endpoint])
+        nowhere = LinkConfig(connect=["tcp/127.0.0.1:9"])
+        async with open_session(listening) as robot, open_session(nowhere) as operator:
+            mine, his = robot.link(ROBOT), operator.link(ROBOT)
+            commands, states = Heard(), Heard()
+            mine.subscribe(COMMAND, commands)
+            his.subscribe(STATE, states)
+            put_command: Callable[[bytes], None] = his.publish(COMMAND.of("anna"))
+            refused = frozenset({"operator:ben"})
+            opened = await open_zenoh(LinkConfig(connect=[endpoint]))
+            assert await operator.replace(opened, refused)
+            assert operator.refused == refused
+            await heard_through(put_command, commands, b"after")
+            await heard_through(mine.publish(STATE), states, b"after")
+            late = await open_zenoh(LinkConfig(connect=[endpoint]))
+            assert not await operator.replace(late, frozenset(), lambda: False)
+            assert late.is_closed()
+            assert not opened.is_closed()
+
+    run(test)

@@ -103,3 +103,24 @@ def test_a_person_does_not_wait_for_ever(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_what_no_waiting_mends_ends_it(monkeypatch: pytest.MonkeyPatch, mode: str, words: str) -> None:
     with pytest.raises(LinkError, match=words):
         opened(monkeypatch, mode, 1, words)
+
+
+def test_a_client_gives_a_slow_line_more_time_in_every_second_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[tuple[str, float]] = []
+
+    async def attempt(settings: Any) -> object:
+        seconds = settings["transport"]["unicast"]["open_timeout"] / 1e3
+        tried.append((settings["connect"]["endpoints"][0], seconds))
+        if len(tried) < 6:
+            raise zenoh.ZError("Unable to connect to any of [..]")
+        return "a session"
+
+    monkeypatch.setattr(opening, "_open_off_the_loop", attempt)
+    monkeypatch.setattr(opening, "RETRY_S", 0.0)
+    other = "tcp/127.0.0.1:2"
+    config = LinkConfig(connect=[ROUTER, other], mode="client", open_timeout_s=4.0)
+    asyncio.run(opening.open_zenoh(config))
+    assert tried == [(ROUTER, 4.0), (other, 4.0), (ROUTER, 10.0), (other, 10.0), (ROUTER, 4.0), (other, 4.0)]
+    tried.clear()
+    asyncio.run(opening.open_zenoh(config, within_s=5.0))
+    assert {seconds for _, seconds in tried} == {4.0}, "a person's question does not wait so long"
