@@ -128,13 +128,13 @@ def test_a_pattern_stands_for_the_listed_robots() -> None:
         for name in ("anna", "ben"):
             key = f"tandem/{robot}/operator/{name}/command"
             assert may(f"operator:{name}", "put", key, table=rules) == (name in by)
-    for robot, by in (("other", "ben"), ("home-1", "anna"), ("ward-1/x", "anna")):
-        key = f"tandem/{robot}/operator/{by}/command"
+    for robot, operator in (("other", "ben"), ("home-1", "anna"), ("ward-1/x", "anna")):
+        key = f"tandem/{robot}/operator/{operator}/command"
         received = {
             who for who in [*named(access), f"robot:{robot}"] if may(who, "put", key, "egress", rules)
         }
         heard = {who for who in received if who.startswith("robot:")}
-        sent = may(f"operator:{by}", "put", key, table=rules)
+        sent = may(f"operator:{operator}", "put", key, table=rules)
         assert not (sent and heard), "a robot that is not listed hears nobody, also where a pattern fits it"
     assert operators_of(access, "ward-2") == {"anna", "ben"}
     assert access.mistakes() == []
