@@ -34,6 +34,7 @@ from common.wire.version import software
 from master.alarms.operator import OperatorAlarms
 from master.alarms.player import TonePlayer
 from master.capture.source import with_extended
+from master.command_rate import CommandRate
 from master.config import MasterConfig
 from master.deadman.grip import Grip
 from master.deadman.switches import Switches
@@ -98,6 +99,7 @@ class Master:
             for bus in config.capture.buses
         ]
         self._fleet = Fleet(config, session, self._pipeline.skeleton)
+        self._rate = CommandRate(config.capture.rate)
         self._pressed = PressedKey()
         self._silence = SilenceWatch()
         self._alarms = OperatorAlarms()
@@ -144,7 +146,15 @@ class Master:
                 self._send(late)
                 if self._tap is not None:  # the way of a suit of which no node is asked
                     self._tap.rest(monotonic_ns())
+            if due.tick % self._config.capture.rate.usual == 0:
+                self._follow_lines()
             self._notifier.beat(monotonic_ns())
+
+    def _follow_lines(self) -> None:
+        """Send as many commands a second as the robots' lines allow."""
+        if self._rate.follow(self._fleet.wanted_ms):
+            self._calls.set_decimation(self._rate.decimation)
+            log.info("commands at %s", self._rate.words)
 
     async def _sound(self) -> None:
         """Play the tone that is due."""
@@ -229,6 +239,8 @@ class Master:
             software=software(),
             operator=self._config.operator.name,
             paths=self._session.paths,
+            command_hz=self._rate.hz,
+            command_rate=self._rate.words,
             heap=heap_in_use(),
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
             stages_ms=self._stages.summary(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -21,6 +21,7 @@ from common.skeleton.load import ProfileName
 from common.tap.config import TapConfig, socket_mistakes
 from master.alarms.config import AlarmsConfig
 from master.capture.config import SuitSection
+from master.capture.rate import USUAL_HZ, CaptureRate
 from master.capture.source import suit_mistakes
 from master.comfort.config import ZeroPoseAgainConfig
 from master.comfort.scaling import scaling_mistakes
@@ -46,14 +47,21 @@ class CaptureConfig(Section):
 
     rate_hz: int = Field(200, ge=10, le=1000)
     """SYNC frames a second."""
-    decimation: int = Field(16, ge=1, le=1000)
-    """One tick in this many yields a command: 200 / 16 = 12.5 Hz. 8: 25 Hz, for a line that carries it."""
+    command_hz: Literal["auto"] | Annotated[float, Field(ge=0.2, le=1000.0)] = USUAL_HZ
+    """Commands a second: 12.5, 25, 50, or "auto", as the robots' lines allow (docs/command-rate.md)."""
+    decimation: int | None = Field(None, ge=1, le=1000)
+    """In place of `command_hz`: one tick in this many yields a command, 200 / 16 = 12.5 Hz."""
     lost_after: int = Field(20, ge=1, le=10_000)
     """Missed ticks in a row after which a node counts as lost."""
     dbc: RelativePath = SHIPPED_DBC
     """The DBC file that describes the frames of nodes that answer SYNC, and the buttons'."""
     plausibility: PlausibilityConfig = PlausibilityConfig()
     buses: list[BusConfig] = Field(min_length=1)
+
+    @property
+    def rate(self) -> CaptureRate:
+        """Ticks a second, and which of them decide."""
+        return CaptureRate(self.rate_hz, self.command_hz, self.decimation)
 
 
 class OperatorConfig(Section):
@@ -139,6 +147,7 @@ class MasterConfig(Section):
         return [
             *self._robot_mistakes(),
             *self._switch_mistakes(),
+            *self.capture.rate.mistakes(),
             *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
             *node_mistakes(self.nodes, skeleton, self.suit.without_node),
             *suit_mistakes(self.nodes, self.suit, self.capture.buses, skeleton.segment_names),

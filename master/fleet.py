@@ -67,6 +67,12 @@ class Fleet:
             yield robot
 
     @property
+    def wanted_ms(self) -> dict[str, int]:
+        """By robot that obeys this operator, the period between two commands that it asks for."""
+        wanted = {robot.name: robot.wanted_period_ms for robot in self._commanded}
+        return {name: period_ms for name, period_ms in wanted.items() if period_ms is not None}
+
+    @property
     def _commanded(self) -> list[CommandedRobot]:
         return [robot for robot in self.robots if robot.name not in self._given_up]
 

@@ -72,7 +72,8 @@ class MasterPipeline:
             top, derived,
         )  # fmt: skip
         self._disbelieved: Mask = np.zeros(len(nodes), np.bool_)
-        self._decimation = config.capture.decimation
+        self._decimation = config.capture.rate.usual
+        self._rate_hz = config.capture.rate_hz
         self._window_open = False
         self.last_sweep: Sweep | None = None
         """The newest tick's readings, before the filters."""
@@ -185,6 +186,7 @@ class MasterPipeline:
             velocity_rad_s=np.where(known, velocity, 0.0),
             valid=known,
             doubt=hold or (refusal(self.doubts) if self.doubts else ""),
+            period_ms=round(1e3 * self._decimation / self._rate_hz),
         )
 
     def _of_suit(self) -> Doubts:
@@ -284,4 +286,5 @@ class CommandWriter:
             seen_ns=seen[1],
             doubt=angles.doubt,
             clutch_out=grip.clutch_out,
+            period_ms=angles.period_ms,
         )

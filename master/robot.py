@@ -202,6 +202,17 @@ class CommandedRobot:
         return not self._watch.silent(monotonic_ns(), MOVES_S)
 
     @property
+    def wanted_period_ms(self) -> int | None:
+        """What the robot's line lets it ask for between two commands, 0: it does not say.
+
+        None while it is not heard, or does not obey this operator: then it has no say in the rate.
+        """
+        state = self._watch.state
+        if state is None or not self._lease.holds(state) or self._watch.silent(monotonic_ns()):
+            return None
+        return state.wanted_period_ms
+
+    @property
     def sign(self) -> RobotSign:
         """What the operator's alarms need to know of it."""
         state = self._watch.state

@@ -244,6 +244,7 @@ class Slave:
         return self._pipeline.on_clock(payload, received_ns, monotonic_ns())
 
     async def _publish_statistics(self) -> None:
+        asked_ms = 0
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
             metrics = replace(
                 self.metrics(),
@@ -251,6 +252,11 @@ class Slave:
                 one_way_missing_recent_us=self._pipeline.traffic.due.recent.take_recent(),
             )
             self._put_statistics(encode(Statistics(due.scheduled_ns, metrics)))
+            rate = self._pipeline.traffic.rate
+            if asked_ms not in (0, rate.period_ms):
+                hz, words = 1e3 / rate.period_ms, rate.words
+                log.info("%s: asks for %g commands a second: %s", self._config.robot, hz, words)
+            asked_ms = rate.period_ms
 
     def metrics(self) -> SlaveMetrics:
         """Counters and percentiles for tables and reports."""

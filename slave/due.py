@@ -36,12 +36,14 @@ class DueCommands:
         self._put_ns = self._sequence = 0
         self._transit_ns = 0
         self._periods_ns: deque[int] = deque(maxlen=PERIODS)
+        self._said_ns = 0
 
-    def note(self, clock: int, sequence: int, put_ns: int, transit_ns: int | None) -> None:
+    def note(self, clock: int, sequence: int, put_ns: int, transit_ns: int | None, said_ns: int = 0) -> None:
         """Take one command.
 
         `clock` is the number of the master's clock, which outlasts a lease: a master that stalled has to
-        claim the robot anew. `transit_ns`: put to received; None while the offset is not trusted.
+        claim the robot anew. `transit_ns`: put to received; None while the offset is not trusted. `said_ns`:
+        the period that the command says; 0: none, and it is measured.
         """
         self.came += 1
         if transit_ns is not None:
@@ -50,18 +52,21 @@ class DueCommands:
         if clock != self._clock:
             self._clock = clock
             self._periods_ns.clear()
+            self._said_ns = said_ns
         elif sequence <= self._sequence or put_ns <= self._put_ns:
             return
         else:
-            self._gap(put_ns - self._put_ns, sequence - self._sequence)
+            self._gap(put_ns - self._put_ns, sequence - self._sequence, said_ns)
         self._put_ns, self._sequence = put_ns, sequence
 
     def forget(self) -> None:
         """The master gave the robot back: until it claims it again nothing is due."""
         self._clock = None
 
-    def _gap(self, gap_ns: int, numbers: int) -> None:
-        period_ns = self.period_ns
+    def _gap(self, gap_ns: int, numbers: int, said_ns: int) -> None:
+        # where the rate changes, the slower one may still hold
+        period_ns = max(said_ns, self._said_ns) or self.period_ns
+        self._said_ns = said_ns
         missing = int(gap_ns / period_ns + EARLY) - 1
         if missing > 0:
             self.missing += missing
@@ -72,7 +77,9 @@ class DueCommands:
 
     @property
     def period_ns(self) -> int:
-        """Between two commands, as this master sends them."""
+        """Between two commands, as this master says, or sends them."""
+        if self._said_ns:
+            return self._said_ns
         return (
             round(statistics.median(self._periods_ns)) if self._periods_ns else round(1e9 / COMMAND.rate_hz)
         )

@@ -54,6 +54,7 @@ def slave_metrics(
         paths=paths,
         contact_from="" if pipeline.contact.missing(now_ns) else pipeline.contact.dull,
         times=guard.times.metrics(),
+        rate=traffic.rate.metrics(),
     )
 
 

@@ -236,6 +236,7 @@ class SlavePipeline:
                 blind_m=self.motion.blind.way_m,
                 blind_s=self.motion.blind.after_s,
                 clamped=clamped if clamped.any() else None,
+                wanted_period_ms=self.traffic.rate.period_ms,
             )
         )
 

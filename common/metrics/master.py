@@ -115,6 +115,10 @@ class MasterMetrics(Metrics):
     """In the file at the end only."""
     paths: str = ""
     """Of two paths, which one does not carry and why; see `[link.twin]`."""
+    command_hz: float | None = None
+    """Commands a second in force."""
+    command_rate: str = ""
+    """Which rate that is and why, in words."""
     zero_pose_again: ZeroPoseTaken | None = None
     arm_load: dict[str, ArmLoad] = field(default_factory=dict)
     """By arm."""

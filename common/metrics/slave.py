@@ -55,6 +55,20 @@ class GuardTimes(Metrics):
 
 
 @dataclass(frozen=True, slots=True)
+class RateMetrics(Metrics):
+    """The rate of the commands of the lease's holder; see `slave/command_rate.py`."""
+
+    hz: float | None
+    """In force, as the newest command says; None where it says nothing."""
+    wanted_hz: float | None
+    """What this robot's line lets it ask for."""
+    falls: int
+    """Times that it asked for the usual rate again, because of loss or jitter."""
+    words: str
+    """Why."""
+
+
+@dataclass(frozen=True, slots=True)
 class LeaseMetrics(Metrics):
     """The lease that is in force."""
 
@@ -183,6 +197,7 @@ class SlaveMetrics(Metrics):
     contact_from: str = ""
     """Below which force no push is noticed, by segment, in words; empty where none is at all."""
     times: GuardTimes | None = None
+    rate: RateMetrics | None = None
     paths: str = ""
     """Of two paths, which one does not carry and why; see `[link.twin]`."""
     access: AccessMetrics | None = None

@@ -34,11 +34,15 @@ from common.wire.messages import (
     Truth,
 )
 
-VERSION = 5
-READABLE = (4, VERSION)
-"""In version 4 a state told no clamped joints, and clock messages no reference; all else was as now."""
-_NEWER: dict[type, tuple[object, ...]] = {RobotState: (b"",), ClockQuery: (None,), ClockReply: (None,)}
-"""What stands for the fields that a message of version 4 does not have."""
+VERSION = 6
+READABLE = (4, 5, VERSION)
+"""In version 4 a state told no clamped joints, and clock messages no reference; in version 5 commands and
+states told no rate of commands. All else was as now."""
+_ADDED: dict[int, dict[type, tuple[object, ...]]] = {
+    5: {RobotState: (b"",), ClockQuery: (None,), ClockReply: (None,)},
+    6: {RobotState: (0,), Command: (0,)},
+}
+"""By version, what stands for its new fields in a message that is older."""
 CONTROL_BYTES = 1100
 """Of a command, a state, and whatever else the robot is controlled by. With the headers of IPv6, TCP, TLS and
 Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
@@ -90,8 +94,10 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
             f"schema version {fields.short(array[1])}, expected {VERSION}: the other side runs another "
             "version of tandem, install the same on both hosts"
         )
-    newer = _NEWER.get(kind, ()) if array[1] < VERSION else ()
-    message = unpack((*array[2:], *newer), joints)
+    fields_of = array[2:]
+    for version in range(array[1] + 1, VERSION + 1):
+        fields_of += _ADDED[version].get(kind, ())
+    message = unpack(fields_of, joints)
     assert isinstance(message, kind)
     return message
 
@@ -114,12 +120,12 @@ def _pack_command(m: Command) -> tuple[object, ...]:
     return (
         m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.angles_ns, s.put_ns,
         m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
-        m.seen_frame, m.seen_ns, fields.shorten(m.doubt, MAX_DOUBT), m.clutch_out,
+        m.seen_frame, m.seen_ns, fields.shorten(m.doubt, MAX_DOUBT), m.clutch_out, m.period_ms,
     )  # fmt: skip
 
 
 def _unpack_command(f: tuple[object, ...], joints: int) -> Command:
-    fields.array(f, 15)
+    fields.array(f, 16)
     lease, sequence, tick, sampled_ns, frames_in_ns, angles_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
     return Command(
@@ -136,6 +142,7 @@ def _unpack_command(f: tuple[object, ...], joints: int) -> Command:
         fields.count(f[12]),
         fields.text(f[13], MAX_DOUBT),
         fields.flag(f[14]),
+        fields.count(f[15]),
     )
 
 
@@ -154,12 +161,12 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
         m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
         _pack_base(m.base), m.lease_id, m.instance, m.resting, *torques, m.blind_m, m.blind_s,
-        clamped,
+        clamped, m.wanted_period_ms,
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
-    fields.array(f, 22)
+    fields.array(f, 23)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -186,6 +193,7 @@ def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
         blind_m=fields.numbers(f[19], 0.0, MAX_WAY_M),
         blind_s=fields.number(f[20], 0.0, MAX_WAY_S),
         clamped=fields.bits(f[21], joints),
+        wanted_period_ms=fields.count(f[22]),
     )
 
 

@@ -31,7 +31,7 @@ class CommandStamps:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """The operator's posture, master → slave, 12.5 Hz."""
+    """The operator's posture, master → slave, 12.5 Hz or as negotiated."""
 
     robot: str
     lease: int
@@ -55,6 +55,8 @@ class Command:
     empty where the operator's side has nothing against it."""
     clutch_out: bool = False
     """The operator has released the clutch: he repositions himself, and is not to be followed meanwhile."""
+    period_ms: int = 0
+    """Until the next one is due, as the rate in force has it; 0 where the sender does not say."""
     operator: str = ""
     """On whose key it arrived (`common.wire.sender`). Not on the wire: the receiver fills it in."""
 
@@ -134,6 +136,8 @@ class RobotState:
     """When all would stand, from that command on."""
     clamped: Mask | None = None
     """(J,) joints that a limit has held back since the state before; None where it was none."""
+    wanted_period_ms: int = 0
+    """Between two commands, as the robot's line lets it ask for; 0 where the robot does not say."""
 
 
 class Action(StrEnum):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import msgpack
 
 from common.errors import CodecError
-from common.wire.codec import MAX_PAYLOAD, VERSION
+from common.wire.codec import MAX_PAYLOAD, READABLE
 from common.wire.fields import MAX_ITEMS
 from common.wire.video import decode_frame
 
@@ -41,7 +41,7 @@ def number_of(payload: bytes) -> Number | None:
         array = msgpack.unpackb(payload, use_list=False, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
     except Exception:  # as in the codec: garbage raises whatever it likes
         return None
-    if type(array) is not tuple or len(array) < 2 or array[0] not in _PLACES or array[1] != VERSION:
+    if type(array) is not tuple or len(array) < 2 or array[0] not in _PLACES or array[1] not in READABLE:
         return None
     places = _PLACES[array[0]]
     if len(array) <= max(places):

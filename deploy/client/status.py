@@ -11,7 +11,7 @@ from common.clock import to_ms
 from common.latency.one_way import master_offset
 from common.link import Link, open_session
 from common.metrics.parts import Summary, Ticks
-from common.metrics.slave import DueMetrics, GuardTimes, LeaseMetrics, OffsetMetrics
+from common.metrics.slave import DueMetrics, GuardTimes, LeaseMetrics, OffsetMetrics, RateMetrics
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.wire.messages import Action, RobotState
@@ -129,6 +129,10 @@ class RobotStatus:
     """What a joint's drive lacks that it may lack, in words."""
     not_driven: dict[str, str] = field(default_factory=dict)
     """Joints without a servo, in words."""
+    rate: RateMetrics | None = None
+    """Of the commands, as the robot sees it."""
+    command_rate: str = ""
+    """Of the commands, as the operator's side says."""
     paths: tuple[str, ...] = ()
     """Of two paths, which one does not carry, as the robot and the operator's host see it."""
 
@@ -177,6 +181,8 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         unlimited=metrics.servos.unlimited if metrics else "",
         left_out=metrics.servos.left_out if metrics else {},
         not_driven=metrics.servos.not_driven if metrics else {},
+        rate=metrics.rate if metrics else None,
+        command_rate=heard.master.command_rate if heard.master else "",
         paths=_paths(heard),
     )
 

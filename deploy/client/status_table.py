@@ -64,6 +64,9 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     if one.times is not None:
         words.append((one.times.words, ""))
         words += [(one.times.beyond, "red")] * bool(one.times.beyond)
+    if one.command_rate and one.rate is not None:
+        line = f"commands: {one.command_rate}; the robot would take {one.rate.wanted_hz or 0:g} Hz"
+        words.append((f"{line} ({one.rate.words})", "yellow" if one.rate.falls else ""))
     words += [(f"{name}: {why}", "yellow") for name, why in (one.switches or {}).items() if why != "held"]
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     words += [(line, "yellow") for line in without_detection(one.no_effort)]

@@ -20,3 +20,5 @@ class JointAngleSample:
     valid: Mask
     doubt: str = ""
     """Why the robot must not be engaged on this sample, in words; empty where it may."""
+    period_ms: int = 0
+    """Until the next sample is due, as the rate in force has it; 0 where that is not known."""

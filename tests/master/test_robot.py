@@ -97,6 +97,8 @@ class FakeLink:
 
 
 class FakeSession:
+    paths = ""
+
     def __init__(self, **links: FakeLink) -> None:
         self.links = links
 

@@ -17,7 +17,7 @@ AT_12_HZ_DEG, LAG_AT_12_HZ_MS, ROUGHNESS_AT_12_HZ = 0.96, 22.9, 1.76
 @pytest.fixture(scope="module")
 def world() -> VirtualWorld:
     overrides = DemoOptions().overrides()
-    overrides["master"] = [*overrides["master"], "capture.decimation=8"]
+    overrides["master"] = [*overrides["master"], "capture.command_hz=25"]
     world = VirtualWorld(
         WorldSettings(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=ONE_WAY_NS, overrides=overrides)
     )

@@ -138,7 +138,7 @@ class Scene:
 
     def _watch(self, reading: EncoderReading, setpoint: Setpoint) -> None:
         self._seen.append(_RobotTick(self.run.now_ns, self.run.slave_ns, self.guard.state, reading, setpoint))
-        if len(self._seen) % self.run.master_config.capture.decimation == 0:
+        if len(self._seen) % self.run.master_config.capture.rate.usual == 0:
             self.each_period()
 
     @property

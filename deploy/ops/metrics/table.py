@@ -197,6 +197,14 @@ TABLE: tuple[ServedMetric, ...] = (
         "rate({name}[1m])",
     ),
     ServedMetric(
+        "tandem_command_rate_hertz", _G, "Commands a second in force.",
+        _master(lambda m: _one(m.command_hz)), (), "hertz",
+    ),
+    ServedMetric(
+        "tandem_command_rate_falls", _C, "Times that loss or jitter made a robot ask for the usual rate.",
+        _slave(lambda m: _one(None if m.rate is None else m.rate.falls)), (), "short", "increase({name}[5m])",
+    ),
+    ServedMetric(
         "tandem_node_windows", _C, "Ticks of each worn node by what came of them: fresh, late, lost, …",
         _master(
             lambda m: [

@@ -32,6 +32,7 @@ from deploy.sim.world.hands import OperatorHands
 from deploy.sim.world.injection import FaultInjection, Traffic
 from deploy.sim.world.link import VirtualLink
 from master.comfort.scaling import MotionScaling
+from master.command_rate import CommandRate
 from master.config import MasterConfig
 from master.deadman.grip import Grip
 from master.joint_angles.sample import JointAngleSample
@@ -93,6 +94,7 @@ class VirtualWorld:
         self._scaling = MotionScaling(self.master_config.operator.scaling, self.master_config.skeleton)
         self._writer = CommandWriter(self.robot, self._scaling)
         self.hands = OperatorHands(self.master_config)
+        self._rate = CommandRate(self.master_config.capture.rate)
         self._newest: JointAngleSample | None = None
         self._lease = LeaseKeeper(self.robot, self.master_config.operator.name)
         self.clock = MasterExchange()
@@ -295,6 +297,8 @@ class VirtualWorld:
         self.trace.add(state)
         self._lease.on_state(state, self.master_ns)
         self._scaling.on_state(state.guard, state.resting)
+        if self._rate.follow({self.robot: state.wanted_period_ms} if self._lease.holds(state) else {}):
+            self._master.set_decimation(self._rate.decimation)
         request = self._lease.request(self.master_ns)
         if request is not None:
             reply = self.slave.on_control(encode(request), self.slave_ns, sender=request.operator)

@@ -36,6 +36,7 @@ from common.wire.messages import (
     Statistics,
     Truth,
 )
+from common.wire.numbering import number_of
 from tests.published import commanded, master_metrics, slave_metrics
 
 counts = st.integers(0, 2**63 - 1)
@@ -404,7 +405,7 @@ def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: 
         name, most, most, most, "estop", reason, name, mask, zeros, zeros,
         CommandEcho(most, most, most, most, most), -most, most, faults,
         BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros,
-        blind_m=(1.5,) * 5, blind_s=0.5, clamped=mask,
+        blind_m=(1.5,) * 5, blind_s=0.5, clamped=mask, wanted_period_ms=80,
     )  # fmt: skip
     payload = encode(state)
     assert len(payload) <= CONTROL_BYTES
@@ -413,14 +414,30 @@ def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: 
         assert "more" in told["others"] or "others" in faults
 
 
-def test_a_state_of_version_4_is_read_and_tells_no_clamped_joints() -> None:
+@pytest.mark.parametrize(("version", "without"), [(4, 2), (5, 1)])
+def test_a_state_of_an_older_version_is_read_and_tells_nothing_new(version: int, without: int) -> None:
     def older(array: list[object]) -> None:
-        array[1] = 4
-        array.pop()
+        array[1] = version
+        del array[-without:]
 
     assert same(decode(tampered(STATE, older), RobotState, 3), STATE)
-    with pytest.raises(CodecError, match="23 fields, expected 22"):
-        decode(tampered(STATE, put(1, 4)), RobotState, 3)
+    with pytest.raises(CodecError, match=f"{23 + without} fields, expected 23"):
+        decode(tampered(STATE, put(1, version)), RobotState, 3)
+
+
+@pytest.mark.parametrize("version", [4, 5])
+def test_a_command_of_an_older_version_is_read_and_tells_no_rate(version: int) -> None:
+    def older(array: list[object]) -> None:
+        array[1] = version
+        array.pop()
+
+    assert decode(tampered(replace(COMMAND, period_ms=40), older), Command, 3).period_ms == 0
+    assert number_of(tampered(COMMAND, older)) == number_of(encode(COMMAND))
+
+
+def test_the_rate_of_commands_is_told_both_ways() -> None:
+    assert decode(encode(replace(COMMAND, period_ms=40)), Command, 3).period_ms == 40
+    assert decode(encode(replace(STATE, wanted_period_ms=20)), RobotState, 3).wanted_period_ms == 20
 
 
 @pytest.mark.parametrize("bits", [bytes(2), b"\x80\x00", 5, None])
