@@ -75,7 +75,7 @@ class StudyDesk:
 
 def _shown(session: Session, now_ns: int) -> dict[str, object]:
     begun = [mark for mark in session.marks() if mark.kind is MarkKind.STEP]
-    steps = {step.name: step for step in session.protocol.step}
+    steps = {step.name: step for step in session.steps}
     here = steps.get(begun[-1].text) if begun else None
     left = session.steps_left
     return {
@@ -86,7 +86,7 @@ def _shown(session: Session, now_ns: int) -> dict[str, object]:
         "since_s": round(to_s(now_ns - begun[-1].monotonic_ns), 1) if begun else None,
         "next": _step(left[0]) if left else None,
         "done": len(begun),
-        "steps": len(session.protocol.step),
+        "steps": len(session.steps),
         "answered": [[one.step, one.questionnaire] for one in answers_of(session)],
     }
 

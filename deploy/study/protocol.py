@@ -14,6 +14,7 @@ from common.errors import ConfigMistake, TandemError
 from deploy.study.questionnaire import questionnaire_names
 
 CODE = re.compile(r"[A-Za-z0-9]{2,16}")
+COMMITMENT = re.compile(r"[0-9a-f]{64}")
 
 
 class ProtocolStep(Section):
@@ -35,6 +36,12 @@ class StudyProtocol(Section):
     version: str
     signed: bool = False
     """Whether a session's seal must bear a signature, so that one without it fails."""
+    blinded: bool = False
+    """Whether operator and experimenter know the conditions by codes alone: see `tandem session blind`."""
+    conditions: list[str] = Field(default_factory=list)
+    """The conditions' codes: each subject goes through all steps in each, in a balanced order."""
+    commitment: str = ""
+    """What stands for the key of the codes: printed with it."""
     step: list[ProtocolStep] = Field(min_length=1)
 
     def mistakes(self) -> list[ConfigMistake]:
@@ -46,6 +53,19 @@ class StudyProtocol(Section):
         for asked in (step.questionnaire for step in self.step):
             if asked is not None and asked not in questionnaire_names():
                 wrong.append(ConfigMistake("step.questionnaire", asked, expected))
+        return wrong + self._wrong_blinding()
+
+    def _wrong_blinding(self) -> list[ConfigMistake]:
+        if not self.blinded:
+            unused = [name for name in ("conditions", "commitment") if getattr(self, name)]
+            return [ConfigMistake(name, getattr(self, name), "blinded = true beside it") for name in unused]
+        wrong = []
+        if len(set(self.conditions)) < 2 or not all(CODE.fullmatch(code) for code in self.conditions):
+            expected = "two codes or more, as `tandem session blind` printed them"
+            wrong.append(ConfigMistake("conditions", self.conditions, expected))
+        if not COMMITMENT.fullmatch(self.commitment):
+            expected = "64 digits, as `tandem session blind` printed them"
+            wrong.append(ConfigMistake("commitment", self.commitment, expected))
         return wrong
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from common.clock import NS_PER_S, Clock, monotonic_ns, wall_ns
 from common.errors import TandemError
 from common.wire.version import software
+from deploy.study.balanced import balanced_order
 from deploy.study.marks import Mark, MarkKind, look_at_marks, read_marks, write_mark
 from deploy.study.protocol import ProtocolStep, StudyProtocol, check_code, load_protocol
 
@@ -39,6 +40,8 @@ class SessionHead:
     """What the subject has consented to: `motion`, `video`, `sharing`."""
     tandem: str
     machine: str
+    conditions: tuple[str, ...] = ()
+    """Codes of the conditions in this session's order, of a blinded protocol."""
 
 
 class Session:
@@ -49,7 +52,8 @@ class Session:
         self.path = path
         try:
             tree = json.loads((path / SESSION).read_text("utf-8"))
-            self.head = SessionHead(**{**tree, "scope": tuple(tree["scope"])})
+            lists = {key: tuple(tree[key]) for key in ("scope", "conditions") if key in tree}
+            self.head = SessionHead(**{**tree, **lists})
             self.protocol: StudyProtocol = load_protocol(path / PROTOCOL)[0]
         except (OSError, ValueError, TypeError, KeyError):
             raise TandemError(f"{path}: there is no session; `tandem session start` makes one") from None
@@ -84,10 +88,19 @@ class Session:
         return self._begun()[-1] if self._begun() else ""
 
     @property
+    def steps(self) -> list[ProtocolStep]:
+        """The protocol's steps; of a blinded protocol once in each condition, such as `K7-reach`."""
+        return [
+            step.model_copy(update={"name": f"{code}-{step.name}"})
+            for code in self.head.conditions
+            for step in self.protocol.step
+        ] or self.protocol.step
+
+    @property
     def steps_left(self) -> list[ProtocolStep]:
         """Those that have not begun."""
         begun = self._begun()
-        return [step for step in self.protocol.step if step.name not in begun]
+        return [step for step in self.steps if step.name not in begun]
 
     def next_step(self) -> str | None:
         """Begin the next step; its name, None where all are done."""
@@ -99,6 +112,12 @@ class Session:
 
     def _begun(self) -> list[str]:
         return [mark.text for mark in look_at_marks(self.path)[0] if mark.kind is MarkKind.STEP]
+
+
+def _order(root: Path, protocol: StudyProtocol, new: Path) -> tuple[str, ...]:
+    """The conditions' order: the next row of a balanced square, over all sessions of the study."""
+    before = sum(path != new for path in root.glob("sub-*/ses-*"))
+    return tuple(balanced_order(sorted(protocol.conditions), before, protocol.commitment))
 
 
 def expects_signature(folder: Path) -> bool:
@@ -143,6 +162,7 @@ def begin(
         scope=tuple(scope),
         tandem=software().tandem,
         machine=f"{platform.machine()} {platform.system()}",
+        conditions=_order(root, checked, path),
     )
     (path / PROTOCOL).write_bytes(protocol.read_bytes())
     (path / SESSION).write_text(json.dumps(asdict(head), indent=2, ensure_ascii=False) + "\n", "utf-8")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from deploy.experiments.trial.cell.plan import TrialPlan
     from deploy.experiments.trial.progress import Progress
     from deploy.experiments.trial.run import RunCell
+    from deploy.study.blinding import BlindKey
 
 app = typer.Typer(invoke_without_command=True, no_args_is_help=False, rich_markup_mode="markdown")
 
@@ -78,6 +79,15 @@ MaxAge = Annotated[
         max=2.0,
     ),
 ]
+Blinded = Annotated[
+    Path | None,
+    typer.Option(
+        help="Key of `tandem session blind`: its transports are run and shown by codes only, in a balanced "
+        "order, until `tandem session unblind`. In place of --transports.",
+        exists=True,
+        dir_okay=False,
+    ),
+]
 Record = Annotated[
     bool,
     typer.Option(
@@ -114,7 +124,9 @@ STOP_S = 30.0
 @app.callback()
 def trial(
     context: typer.Context,
-    transports: Annotated[str, typer.Option(help="Transports, separated by commas, or `all`.")] = "tcp,udp",
+    transports: Annotated[
+        str | None, typer.Option(help="Transports, separated by commas, or `all`; else tcp,udp.")
+    ] = None,
     profiles: Networks = "4g",
     strategies: Strategies = "latest,predict",
     repeat: Annotated[int, typer.Option(help="Number of runs of each combination.", min=1, max=100)] = 3,
@@ -126,6 +138,7 @@ def trial(
     robot_profile: WhichRobot = "nursing",
     seed: Seed = 1,
     router: Router = False,
+    blinded: Blinded = None,
     max_age: MaxAge = 0.0,
     report: ReportFolder = Path("trial"),
     record: Record = True,
@@ -154,15 +167,17 @@ def trial(
     if 0.0 < outage < SHORTEST_OUTAGE_S:
         raise TandemError(f"--outage {outage:g}: expected 0, or {SHORTEST_OUTAGE_S:g} s or longer")
     networks = (profiles,) if remote else choose("--profiles", profiles)
+    hidden = None if blinded is None else _hidden(blinded, transports, report, remote)
     plan = TrialPlan(
-        transports=choose("--transports", transports), profiles=networks,
+        transports=choose("--transports", transports or "tcp,udp") if hidden is None else hidden.codes,
+        blinded="" if hidden is None else hidden.commitment, profiles=networks,
         strategies=choose("--strategies", strategies), repeat=repeat, seconds=seconds,
         outage_s=0.0 if remote else outage, robot=robot_profile, motion=motion or _own_motion(robot_profile),
         seed=seed, router=router,
         max_age_s=max_age, hosts=remote or "namespaces",
     )  # fmt: skip
     if remote is None:
-        _run_here(plan, report, tasks, record)
+        _run_here(plan, report, tasks, record, hidden)
     else:
         _run_remote(plan, report, tasks, record, link)
 
@@ -270,7 +285,20 @@ def report(
     _finish(folder, tasks, Console())
 
 
-def _run_here(plan: TrialPlan, path: Path, tasks: Path | None, record: bool) -> None:
+def _hidden(key: Path, transports: str | None, report: Path, remote: str | None) -> BlindKey:
+    """The key of a blinded trial. Raises TandemError where it cannot be run."""
+    from deploy.experiments.trial.cell.choice import why_impossible
+    from deploy.study.blinding import read_key
+
+    if transports is not None or remote is not None:
+        raise TandemError("--blinded: expected without --transports and --remote; the key names transports")
+    hidden = read_key(key, report)
+    if any(why_impossible(condition.transport) for condition in hidden.conditions.values()):
+        raise TandemError(f"{key}: one of its transports does not cross hosts: draw a key without it")
+    return hidden
+
+
+def _run_here(plan: TrialPlan, path: Path, tasks: Path | None, record: bool, hidden: BlindKey | None) -> None:
     from functools import partial
 
     from deploy.experiments.trial.cell.stage import run_cell
@@ -279,7 +307,7 @@ def _run_here(plan: TrialPlan, path: Path, tasks: Path | None, record: bool) -> 
     reason = why_not()
     if reason is not None:
         raise NetworkError(f"{reason}; with the robot on another host, no such rights are needed: --remote")
-    _run(plan, path, tasks, partial(run_cell, folder=path if record else None))
+    _run(plan, path, tasks, partial(run_cell, folder=path if record else None, hidden=hidden))
 
 
 def _run_remote(plan: TrialPlan, path: Path, tasks: Path | None, record: bool, link: Path | None) -> None:

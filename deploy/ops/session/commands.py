@@ -195,6 +195,59 @@ def verify_folder(
 
 
 @app.command()
+def blind(
+    conditions: Annotated[Path, typer.Argument(help="TOML file with a [[condition]] per transport.")],
+    key: Annotated[
+        Path, typer.Option(help="New file for the key, outside of the study (mode 0600).", dir_okay=False)
+    ],
+) -> None:
+    """Draw codes for transports, so that operator and experimenter do not know which one runs.
+
+    For somebody who takes no part. The printed lines are for the protocol; the key is not to be looked into
+    before the study is sealed. A condition is `transport = "quic"` and `connect = ["quic/ROBOT_HOST:7447"]`.
+
+    Example: `tandem session blind conditions.toml --key ~/keys/cup.key`
+    """
+    from deploy.study.blinding import draw_key, write_key
+
+    drawn = draw_key(conditions)
+    write_key(drawn, key)
+    typer.echo(f'blinded = true\nconditions = {json.dumps(drawn.codes)}\ncommitment = "{drawn.commitment}"')
+
+
+@app.command()
+def unblind(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder of a session or of a trial.", exists=True, file_okay=False)
+    ],
+    key: Annotated[Path, typer.Option(help="The key of `tandem session blind`.", dir_okay=False)],
+    unsealed: Annotated[
+        bool, typer.Option("--unsealed", help="Also where the folder has not been sealed.")
+    ] = False,
+) -> None:
+    """Show which code stood for which transport, once the folder is sealed.
+
+    It is refused where a sealed file was changed, or where the key is not the one that was committed to.
+
+    Example: `tandem session unblind study/sub-k7pd/ses-01 --key ~/keys/cup.key`
+    """
+    from deploy.study.blinding import check_key, read_key
+    from deploy.study.commitment import committed_in
+    from deploy.study.seal import SEAL, verify
+
+    read, (codes, commitment) = read_key(key, folder), committed_in(folder)
+    check_key(read, key, codes, commitment)
+    if (folder / SEAL).exists():
+        for broken in verify(folder)[1]:
+            raise TandemError(f"{folder}: {broken.name} is not as it was sealed: {broken.words}")
+    elif not unsealed:
+        raise TandemError(f"{folder}: it is not sealed yet: `tandem session seal {folder}`, or --unsealed")
+    for code in read.codes:
+        condition = read.conditions[code]
+        typer.echo("  ".join([code, condition.transport, *condition.connect]))
+
+
+@app.command()
 def person(
     name: Annotated[str, typer.Argument(help="The person's name, as on the consent form.")],
     table: Table,

@@ -88,7 +88,7 @@ def _take(session: Session, key: str) -> None:
 def _words(session: Session, kind: MarkKind, text: str, language: str) -> str:
     if kind is not MarkKind.STEP:
         return f"{kind}: {text}"
-    step = next((step for step in session.protocol.step if step.name == text), None)
+    step = next((step for step in session.steps if step.name == text), None)
     if step is None:
         return f"step {text}"
     told = step.text.get(language) or next(iter(step.text.values()), "")

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from common.errors import ConfigError, ConfigMistake
 from common.link.endpoint import TRANSPORTS
-from deploy.experiments.trial.cell.plan import Setup
 from deploy.sim.network import load_profile, profile_names
 from slave.track.config import STRATEGIES
 
@@ -41,9 +40,9 @@ def choose(option: str, text: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def why_impossible(setup: Setup) -> str | None:
-    """Why this setup cannot be run between two hosts; None where it can."""
-    if setup.transport == "unixsock-stream":
+def why_impossible(transport: str) -> str | None:
+    """Why this transport cannot be run between two hosts; None where it can."""
+    if transport == "unixsock-stream":
         return (
             "a unix socket is a file on one machine: it does not cross hosts, and between namespaces it "
             "would pass the emulated link by"

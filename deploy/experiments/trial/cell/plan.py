@@ -10,6 +10,7 @@ from typing import Self
 
 from common.errors import CodecError, TandemError
 from common.metrics.tree import from_tree
+from deploy.study.balanced import balanced_order
 
 AXES = ("transports", "profiles", "strategies", "repeat")
 """What may differ between the runs that fill one report: which cells there are, not how one is run."""
@@ -68,6 +69,8 @@ class TrialPlan:
     """The guard's age limit; 0: as the network's profile needs it (`settings.py`)."""
     hosts: str = "namespaces"
     """`namespaces`, or the endpoint of the robot's host in a remote trial."""
+    blinded: str = ""
+    """The commitment to the key of a blinded trial, whose `transports` are codes; empty where it is not."""
 
     def setups(self) -> list[Setup]:
         """By profile, then transport, then strategy: the report's order."""
@@ -81,12 +84,16 @@ class TrialPlan:
     def cells(self) -> list[CellKey]:
         """In the order they run: every setup once before any twice, each time in another order.
 
-        So a machine that slows down as the trial goes on does not favour those that come first.
+        So a machine that slows down as the trial goes on does not favour those that come first. The order of
+        a blinded trial is balanced: over the repeats, each setup comes at each place equally often.
         """
         cells = []
         for repetition in range(1, 1 + self.repeat):
             turn = [CellKey(setup, repetition) for setup in self.setups()]
-            random.Random(f"{self.seed} {repetition}").shuffle(turn)
+            if self.blinded:
+                turn = balanced_order(turn, repetition - 1, self.seed)
+            else:
+                random.Random(f"{self.seed} {repetition}").shuffle(turn)
             cells += turn
         return cells
 
@@ -102,7 +109,7 @@ class TrialPlan:
     def of_tree(cls, tree: object) -> Self:
         """Back from JSON. Raises TandemError where it is none."""
         names = {field.name for field in fields(cls)}
-        if not isinstance(tree, dict) or set(tree) != names:
+        if not isinstance(tree, dict) or not names - {"blinded"} <= set(tree) <= names:
             raise TandemError("the report folder's plan is of another version of tandem")
         try:
             return from_tree(cls, tree)

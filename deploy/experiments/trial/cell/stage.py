@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from common.clock import monotonic_ns, to_s
@@ -24,6 +25,7 @@ from deploy.harness.operator import Operator
 from deploy.harness.rig import ROBOT, Rig, open_rig
 from deploy.harness.start import start_all
 from deploy.sim.network import Network, load_profile, open_network
+from deploy.study.blinding import BlindKey, hide_transports
 from slave.config import SlaveConfig
 
 START_S = 30.0
@@ -44,14 +46,18 @@ async def run_cell(
     stop: asyncio.Event,
     show: Callable[[str], None],
     folder: Path | None = None,
+    hidden: BlindKey | None = None,
 ) -> Cell:
     """Run it and judge it. What goes wrong in it is its result; only an interruption raises TandemError.
 
-    `folder`: of the trial, where the cell's recording is kept.
+    `folder`: of the trial, where the cell's recording is kept. `hidden`: which transports the codes of a
+    blinded trial stand for; no text of the cell names one.
     """
-    reason = why_impossible(key.setup)
+    transport = key.setup.transport if hidden is None else hidden.condition(key.setup.transport).transport
+    told = (lambda text: text) if hidden is None else hide_transports
+    reason = why_impossible(transport)
     if reason is not None:
-        return Cell(key, CellStatus.IMPOSSIBLE, reason)
+        return Cell(key, CellStatus.IMPOSSIBLE, told(reason))
     profile = load_profile(key.setup.profile)
     age_s = plan.max_age_s or needed_age_s(profile)
     opening = f"link.open_timeout_s={open_timeout_s(profile)}"
@@ -62,7 +68,7 @@ async def run_cell(
     try:
         async with (
             open_network(profile, seed=plan.seed_of(key)) as network,
-            open_rig(key.setup.transport, overrides, plan.robot, routed=plan.router, network=network) as rig,
+            open_rig(transport, overrides, plan.robot, routed=plan.router, network=network) as rig,
         ):
             course = await _Story(plan, rig, network, stop, show, tape).play(age_s)
             show("stopping")
@@ -72,8 +78,9 @@ async def run_cell(
             tape.close(None)
         if stop.is_set():  # a Ctrl-C reaches the processes too: that they end is then no failure
             raise TandemError("interrupted") from None
-        return Cell(key, CellStatus.FAILED, str(error), settings=settings)
+        return Cell(key, CellStatus.FAILED, told(str(error)), settings=settings)
     ended = tuple(f"the {name} ended with status {status}" for name, status in statuses.items() if status)
+    course = replace(course, remarks=tuple(map(told, course.remarks)))
     show("judging")
     return await asyncio.to_thread(conclude, key, course, config, settings, ended, tape)
 

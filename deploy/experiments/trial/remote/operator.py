@@ -146,7 +146,7 @@ async def run_remote_cell(
 
     `tls`: this host's keys, for the secure transports. `folder`: of the trial, for the cell's recording.
     """
-    reason = why_impossible(key.setup)
+    reason = why_impossible(key.setup.transport)
     if reason is None and key.setup.transport in SECURE and tls is None:
         reason = "no keys: name a file with [link.tls] by --link, and one over there (see `tandem keys`)"
     if reason is not None:

@@ -23,7 +23,8 @@ TASKS_COPY = "tasks.toml"
 
 def write(folder: Folder, tasks: Path = TASKS) -> Findings:
     """Write the three files and a copy of the tasks. Raises TandemError where the disk does not let them."""
-    f, about = find(folder, tasks), _about()
+    f = find(folder, tasks)
+    about = _about(blinded=bool(f.plan.blinded))
     texts = {
         HTML: as_html(f, plots(f.rows), about),
         JSON: as_json(tree(f, about)),
@@ -36,7 +37,8 @@ def write(folder: Folder, tasks: Path = TASKS) -> Findings:
     return f
 
 
-def _about() -> dict[str, str]:
+def _about(blinded: bool) -> dict[str, str]:
+    """`blinded`: no transport is named."""
     now = datetime.datetime.now(datetime.UTC)
     about = {
         "written": now.strftime("%Y-%m-%d %H:%M UTC"),
@@ -48,4 +50,6 @@ def _about() -> dict[str, str]:
             f"tcp, tls, ws: {congestion_control()}, set on both emulated hosts; quic: Zenoh's own; udp: none"
         ),
     }
+    if blinded:
+        del about["congestion control"]
     return dict(sorted(about.items()))  # as `report.json` has them

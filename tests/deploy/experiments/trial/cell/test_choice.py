@@ -13,7 +13,6 @@ from common.link.endpoint import TRANSPORTS
 from deploy.cli import app
 from deploy.experiments.trial.cell.choice import choose, why_impossible
 from deploy.experiments.trial.cell.folder import Folder
-from deploy.experiments.trial.cell.plan import Setup
 from deploy.sim.network import profile_names
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 
@@ -49,7 +48,7 @@ def test_a_network_of_ones_own_is_a_file(tmp_path: Path) -> None:
 
 
 def test_only_what_does_not_cross_hosts_is_impossible() -> None:
-    why = {t: why_impossible(Setup(t, "lan", "latest")) for t in TRANSPORTS}
+    why = {t: why_impossible(t) for t in TRANSPORTS}
     assert [t for t, reason in why.items() if reason] == ["unixsock-stream"]
     assert "does not cross hosts" in str(why["unixsock-stream"])
 

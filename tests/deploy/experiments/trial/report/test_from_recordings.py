@@ -146,8 +146,11 @@ def test_a_recording_that_reached_its_size_is_not_judged_by(tmp_path: Path) -> N
 
 def test_a_robot_with_a_clock_of_its_own_is_moved_onto_the_masters_again(tmp_path: Path) -> None:
     heard = recording()
-    moved = replace(heard, states=on_masters_clock(heard.states))
-    apart = CellCourse(moved, 0.45, shared_clock=False)
+    there = [replace(one, master_offset_ns=1_000_000_000) for one in heard.states]  # 1 s behind, say
+    heard = replace(heard, states=there)
+    moved = replace(heard, states=on_masters_clock(there))
+    assert moved.states[0].encoder_ns != there[0].encoder_ns
+    apart = replace(course(0, shared_clock=False), judged=moved)
     tape = open_tape(tmp_path, KEYS[0], CONFIG, SETTINGS)
     assert tape is not None
     tape.stretch(JUDGED)
