@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from common.clock import to_ns
 from common.wire.lease import lease_id
-from common.wire.messages import Action, ControlReply, ControlRequest, RobotState
+from common.wire.messages import Action, ControlReply, ControlRequest, SaidOfRobot
 
 RETRY_S = 0.25
 """Between two claims: a restarted master waits out the lease of its predecessor (1 s)."""
@@ -43,11 +43,11 @@ class LeaseKeeper:
             self.token, self.instance = reply.lease, reply.instance
             self._granted_ns = now_ns
 
-    def holds(self, state: RobotState) -> bool:
+    def holds(self, state: SaidOfRobot) -> bool:
         """Whether the robot says that this master's lease is the live one; another's may bear its name."""
         return self.token != 0 and state.instance == self.instance and state.lease_id == lease_id(self.token)
 
-    def on_state(self, state: RobotState, now_ns: int) -> None:
+    def on_state(self, state: SaidOfRobot, now_ns: int) -> None:
         """Notice a lease that was lost: it is claimed anew, but only a person engages again."""
         settled = now_ns - self._granted_ns > to_ns(GRACE_S)
         if self.token and settled and not self.holds(state):

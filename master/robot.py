@@ -19,7 +19,7 @@ from common.process.pacing import TickGrid
 from common.process.ticker import coarse_ticks
 from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance
-from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
+from common.wire.messages import ClockReply, ControlReply, StateHead, Statistics
 from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, COMMAND, CONTROL, IN_ORDER, KEYFRAME, LOST, STATE, STATISTICS, VIDEO
 from master.alarms.situation import RobotSign
@@ -34,10 +34,19 @@ from master.robot_watch import RobotWatch
 from master.watched import TakenRobot
 
 ENGAGED = ("align", "track", "clutch")
+WAITS_S, HELD_S = 0.05, 0.1
+"""Between two looks at the lease: while it is not held, and while it is."""
+CLOCK_SETTLED, CLOCK_EASY = 40, 2
+"""After so many questions the clock of a robot that does not move is asked at every second turn only."""
 MOVES_S = 5.0
 """A robot that followed when it was heard last counts as following for so long."""
 
 log = logging.getLogger(__name__)
+
+
+def asks_clock(turn: int, moves: bool) -> bool:
+    """Whether the robot's clock is asked at this turn: its measurement costs as much as eight states."""
+    return moves or turn <= CLOCK_SETTLED or turn % CLOCK_EASY == 0
 
 
 class CommandedRobot:
@@ -111,7 +120,7 @@ class CommandedRobot:
 
     def _on_state(self, payload: bytes, arrived_ns: int) -> None:
         try:
-            state = decode(payload, RobotState, self._joints)
+            state = decode(payload, StateHead, self._joints)
         except CodecError as error:
             self._undecodable += 1
             self._unread, self._unread_ns = str(error), arrived_ns
@@ -129,8 +138,9 @@ class CommandedRobot:
         self._watch.on_state(state, arrived_ns, ours=self._lease.holds(state))
 
     async def _keep_lease(self) -> None:
-        async for due in coarse_ticks(TickGrid(monotonic_ns(), to_ns(0.05))):
-            change = self._watch.change(due.scheduled_ns)
+        while True:
+            await asyncio.sleep(HELD_S if self._lease.token else WAITS_S)
+            change = self._watch.change(monotonic_ns())
             if change:
                 log.warning("%s: %s", self.name, change)
             if await self._two_answer(monotonic_ns()):
@@ -172,7 +182,9 @@ class CommandedRobot:
             log.warning("%s: %s", self.name, presence.other_version)
 
     async def _keep_clock(self) -> None:
-        async for _ in coarse_ticks(TickGrid(monotonic_ns(), round(1e9 / CLOCK.rate_hz))):
+        async for due in coarse_ticks(TickGrid(monotonic_ns(), round(1e9 / CLOCK.rate_hz))):
+            if not asks_clock(due.tick, self.moves):
+                continue
             query = self.clock.query(monotonic_ns())
             try:
                 payload, arrived_ns = await self._link.ask_stamped(CLOCK, encode(query))

@@ -6,7 +6,7 @@ from common.clock import to_ns
 from common.latency.arrivals import Arrivals
 from common.latency.durations import StreamedDurations
 from common.latency.one_way import round_trip_ns
-from common.wire.messages import RobotState
+from common.wire.messages import SaidOfRobot
 from common.wire.topics import STATE
 
 
@@ -14,7 +14,7 @@ class RobotWatch:
     """The newest state, whether the robot has fallen silent, and round-trip times."""
 
     def __init__(self) -> None:
-        self.state: RobotState | None = None
+        self.state: SaidOfRobot | None = None
         self.round_trip = StreamedDurations()
         self.arrivals = Arrivals()
         """Of the states, by their numbers; a robot that starts anew begins its count anew."""
@@ -23,7 +23,7 @@ class RobotWatch:
         self._was_silent = True
         self.times_lost = 0
 
-    def on_state(self, state: RobotState, arrived_ns: int, ours: bool = True) -> None:
+    def on_state(self, state: SaidOfRobot, arrived_ns: int, ours: bool = True) -> None:
         """Take a state message; each command's echo closes one round trip.
 
         `ours`: whether this master holds the lease. Else the echoes are of another's commands.

@@ -6,6 +6,8 @@ from common.metrics.slave import ArrivalCounts
 
 REMEMBERED = 256
 """A missing number may still come this many numbers later (20 s) and is then late, not lost."""
+_FORGOTTEN_EVERY = 32
+"""Numbers between two clearings of those that are too old: each goes through all that are missing."""
 
 
 class Arrivals:
@@ -36,16 +38,21 @@ class Arrivals:
             self._missing.clear()
         elif sequence > self._newest:
             self.lost += sequence - self._newest - 1
-            if self._missing or sequence != self._newest + 1:
+            if sequence != self._newest + 1:
                 self._missing.update(range(max(self._newest + 1, sequence - REMEMBERED), sequence))
-                self._missing = {number for number in self._missing if number >= sequence - REMEMBERED}
+                self._forget(sequence)
+            elif self._missing and sequence % _FORGOTTEN_EVERY == 0:
+                self._forget(sequence)
             self._newest = sequence
-        elif sequence in self._missing:
+        elif sequence in self._missing and sequence >= self._newest - REMEMBERED:
             self._missing.remove(sequence)
             self.lost -= 1
             self.late += 1
         else:
             self.repeated += 1
+
+    def _forget(self, sequence: int) -> None:
+        self._missing = {number for number in self._missing if number >= sequence - REMEMBERED}
 
     def metrics(self) -> ArrivalCounts:
         """The counts so far."""

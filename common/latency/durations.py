@@ -55,11 +55,12 @@ class Durations:
         """Mean and maximum exact, percentiles to three digits."""
         if not self.count:
             return Summary(0)
+        p50_us, p99_us = self._histogram.at_percentiles(50, 99)
         return Summary(
             count=self.count,
             mean=self._sum_ns / self.count / NS_PER_MS,
-            p50=self._histogram.at_percentile(50) / 1000,
-            p99=self._histogram.at_percentile(99) / 1000,
+            p50=p50_us / 1000,
+            p99=p99_us / 1000,
             max=self._max_ns / NS_PER_MS,
         )
 

@@ -12,7 +12,7 @@ There and back, on the sender's clock alone:
 from __future__ import annotations
 
 from common.clock_sync import UNKNOWN_NS, Offset
-from common.wire.messages import CommandEcho, RobotState
+from common.wire.messages import CommandEcho, RobotState, SaidOfRobot
 
 
 def one_way_ns(sent_ns: int, received_ns: int, offset: Offset) -> int | None:
@@ -24,7 +24,7 @@ def one_way_ns(sent_ns: int, received_ns: int, offset: Offset) -> int | None:
     return offset.remote_ns(received_ns) - sent_ns if offset.trusted else None
 
 
-def round_trip_ns(state: RobotState, echo: CommandEcho, arrived_ns: int) -> int:
+def round_trip_ns(state: SaidOfRobot, echo: CommandEcho, arrived_ns: int) -> int:
     """From the put of the command in the echo to the state's arrival, without the time on the slave."""
     return arrived_ns - echo.put_ns - (state.sent_ns - echo.received_ns)
 

@@ -30,6 +30,7 @@ from common.wire.messages import (
     ControlRequest,
     Message,
     RobotState,
+    StateHead,
     Statistics,
     Truth,
 )
@@ -39,8 +40,8 @@ READABLE = (4, 5, VERSION)
 """In version 4 a state told no clamped joints, and clock messages no reference; in version 5 commands and
 states told no rate of commands. All else was as now."""
 _ADDED: dict[int, dict[type, tuple[object, ...]]] = {
-    5: {RobotState: (b"",), ClockQuery: (None,), ClockReply: (None,)},
-    6: {RobotState: (0,), Command: (0,)},
+    5: {RobotState: (b"",), StateHead: (b"",), ClockQuery: (None,), ClockReply: (None,)},
+    6: {RobotState: (0,), StateHead: (0,), Command: (0,)},
 }
 """By version, what stands for its new fields in a message that is older."""
 CONTROL_BYTES = 1100
@@ -197,6 +198,26 @@ def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
     )
 
 
+def _unpack_head(f: tuple[object, ...], joints: int) -> StateHead:
+    """Of the joints' blocks only the lengths are looked at: the robot's own kind of body."""
+    fields.array(f, 23)
+    fields.length(f[7], joints)
+    fields.length(f[8], 8 * joints)
+    return StateHead(
+        sequence=fields.count(f[1]),
+        sent_ns=fields.count(f[2]),
+        guard=fields.text(f[4], MAX_NAME),
+        reason=fields.text(f[5], MAX_TEXT),
+        operator=fields.text(f[6], MAX_NAME),
+        echo=_unpack_echo(f[9]),
+        faults=fields.texts(f[12], MAX_NAME, MAX_TEXT),
+        resting=fields.names(f[16], MAX_NAME),
+        lease_id=fields.count(f[14]),
+        instance=fields.count(f[15]),
+        wanted_period_ms=fields.count(f[22]),
+    )
+
+
 def _pack_base(base: BaseAttitude | None) -> tuple[object, ...] | None:
     if base is None:
         return None
@@ -334,6 +355,7 @@ def _packed(m: Message) -> tuple[object, ...]:
 _DECODERS: dict[type, tuple[str, Callable[[tuple[object, ...], int], object]]] = {
     Command: ("command", _unpack_command),
     RobotState: ("state", _unpack_state),
+    StateHead: ("state", _unpack_head),
     ControlRequest: ("control", _unpack_control_request),
     ControlReply: ("controlled", _unpack_control_reply),
     ClockQuery: ("clock", _unpack_clock_query),

@@ -57,6 +57,12 @@ def pack_torques(torque_nm: Array | None) -> bytes | None:
     return None if torque_nm is None else np.clip(torque_nm, -MAX_NM, MAX_NM).astype(_F2).tobytes()
 
 
+def length(value: object, bytes_: int) -> None:
+    """A block of so many bytes, whose values nobody looks at."""
+    if type(value) is not bytes or len(value) != bytes_:
+        raise CodecError(f"not a block of {bytes_} bytes")
+
+
 def torques(value: object, count: int) -> Array | None:
     """Torques of `count` joints, NaN where one is not known; None where none is."""
     if value is None:

@@ -34,7 +34,7 @@ from master.alarms.situation import RobotSign
 from master.app import Master
 from master.config import MasterConfig
 from master.joint_angles.sample import JointAngleSample
-from master.robot import CommandedRobot
+from master.robot import CLOCK_SETTLED, CommandedRobot, asks_clock
 from tests.published import master_metrics
 
 EXAMPLE = Path(__file__).parents[2] / "deploy" / "examples" / "master.toml"
@@ -245,3 +245,12 @@ def test_the_operator_s_alarms_know_a_robot_only_while_it_is_heard() -> None:
     assert robot.sign == RobotSign()
     link.state(monotonic_ns())
     assert robot.sign == RobotSign("hold", "", ours=False)
+
+
+def test_the_clock_of_a_robot_that_stands_is_asked_at_half_the_rate_once_it_is_known() -> None:
+    assert all(asks_clock(turn, moves=False) for turn in range(CLOCK_SETTLED + 1))
+    later = range(CLOCK_SETTLED + 1, CLOCK_SETTLED + 101)
+    assert sum(asks_clock(turn, moves=False) for turn in later) == 50
+    assert all(asks_clock(turn, moves=True) for turn in later)
+    # the robot takes another asker after a second of silence
+    assert all(any(asks_clock(turn + i, moves=False) for i in range(2)) for turn in later)

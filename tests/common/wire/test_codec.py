@@ -33,6 +33,7 @@ from common.wire.messages import (
     ControlReply,
     ControlRequest,
     RobotState,
+    StateHead,
     Statistics,
     Truth,
 )
@@ -391,6 +392,38 @@ def test_a_command_is_encoded_and_decoded_within_15_us() -> None:
     )
     best = min(timeit.repeat(lambda: decode(encode(command), Command, 25), number=100, repeat=300))
     assert best / 100 < 15e-6
+
+
+HEAD = (
+    "sequence", "sent_ns", "guard", "reason", "operator", "echo", "faults", "resting", "lease_id", "instance",
+    "wanted_period_ms",
+)  # fmt: skip
+
+
+@given(states())
+def test_the_head_of_a_state_says_what_the_whole_one_says(state: RobotState) -> None:
+    head, whole = decode(encode(state), StateHead, 25), decode(encode(state), RobotState, 25)
+    assert {name: getattr(head, name) for name in HEAD} == {name: getattr(whole, name) for name in HEAD}
+
+
+OF_THE_HEAD = (0, 1, 3, 4, 6, 7, 8, 9, 10, 11, 14, 16, 17, 18, 24)
+"""Fields that a head has, or whose length it checks, by their place in the array."""
+
+
+@pytest.mark.parametrize("at", OF_THE_HEAD)
+@pytest.mark.parametrize("value", [-1, [1], {1: 2}, "x" * 600, b"12"])
+def test_what_the_head_takes_is_checked(at: int, value: object) -> None:
+    with pytest.raises(CodecError):
+        decode(tampered(STATE, put(at, value)), StateHead, len(STATE.position_rad))
+
+
+@pytest.mark.parametrize(("version", "without"), [(4, 2), (5, 1)])
+def test_a_head_of_an_older_version_is_read(version: int, without: int) -> None:
+    def older(array: list[object]) -> None:
+        array[1] = version
+        del array[-without:]
+
+    assert decode(tampered(STATE, older), StateHead, len(STATE.position_rad)).guard == STATE.guard
 
 
 @given(

@@ -13,6 +13,7 @@ from statistics import median
 import psutil
 
 from common.clock import monotonic_ns
+from deploy.experiments.bench.fleet.fit import WatchingCost, watching_cost
 from deploy.experiments.bench.fleet.workers import NurseTask, nurse, robot_name, robots, router
 from deploy.experiments.bench.run import machine
 from deploy.experiments.bench.worker import beside, in_worker
@@ -25,7 +26,8 @@ SHARED = 10
 PER_PROCESS, COMMANDED_PER_PROCESS = 500, 50
 """Robots in one process: states at 50 Hz cost more than summaries."""
 WATCHED_LIMIT, COMMANDED_LIMIT, LINEAR_LIMIT = 5.0, 60.0, 20.0
-"""Percent of a core, and percent by which the cost of a watched robot may grow with their number."""
+"""Percent of a core; and percent by which the cost of a watched robot may grow with their number, or the cost
+of watching differ from a line through all sizes."""
 ENOUGH = 0.9
 """Of the messages that should come in a cell: with fewer its CPU time says nothing."""
 
@@ -188,13 +190,23 @@ def _enough(cell: FleetCell, figures: Mapping[str, float]) -> bool:
 def judge(measured: Sequence[MeasuredCell]) -> list[Verdict]:
     """The targets of a fleet. What was not measured at that size is not judged."""
     cost = {one.cell.name: one.core_percent for one in measured if one.measured}
-    alone, watching = cost.get("1 commanded"), cost.get("1 commanded + 99 watched")
-    above = None if alone is None or watching is None else watching - alone
+    alone, beside_others = cost.get("1 commanded"), cost.get("1 commanded + 99 watched")
+    above = None if alone is None or beside_others is None else beside_others - alone
+    line = watching(measured)
     return [
         at_most("1 commanded + 99 watched, above one robot alone", above, WATCHED_LIMIT, "% of a core"),
         at_most("100 commanded", cost.get("100 commanded"), COMMANDED_LIMIT, "% of a core"),
         at_most("cost per watched robot grows by", growth_percent(measured), LINEAR_LIMIT, "%"),
+        at_most(
+            "watching: from fixed + each × N", line.furthest_percent if line else None, LINEAR_LIMIT, "%"
+        ),
     ]
+
+
+def watching(measured: Sequence[MeasuredCell]) -> WatchingCost | None:
+    """The line through the fleets that are only watched; None where too few were measured."""
+    cells = [one for one in measured if one.measured and not one.cell.commanded]
+    return watching_cost({one.cell.robots: one.core_percent for one in cells})
 
 
 def growth_percent(measured: Sequence[MeasuredCell]) -> float | None:
@@ -203,8 +215,8 @@ def growth_percent(measured: Sequence[MeasuredCell]) -> float | None:
     From 100 robots on: ten robots cost less than what two runs of the same fleet differ by. It falls where
     several messages are taken at one waking; only a rise counts.
     """
-    watching = [one for one in measured if one.measured and not one.cell.commanded]
-    watched = {one.cell.robots: one.core_percent for one in watching}
+    only_watched = [one for one in measured if one.measured and not one.cell.commanded]
+    watched = {one.cell.robots: one.core_percent for one in only_watched}
     nobody = watched.pop(0, None)
     if nobody is None:
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from deploy.experiments.bench.fleet.run import FleetReport
+from deploy.experiments.bench.fleet.run import FleetReport, watching
 from deploy.measure.verdict import verdict_table
 from deploy.report.tables import plain_table
 
@@ -23,4 +23,8 @@ def fleet_table(report: FleetReport) -> RenderableType:
             f"{cell.rss_mb:.0f}", f"{cell.states_hz + cell.summaries_hz:.0f}", f"{cell.commands_hz:.0f}",
             f"{cell.router_percent:.1f}", f"{cell.robots_percent:.1f}",
         )  # fmt: skip
+    line = watching(report.cells)
+    if line is not None:
+        words = f"watching N robots costs {line.fixed_percent:.2f} % + {line.each_percent:.4f} % × N"
+        return Group(table, words, verdict_table("is the fleet cheap enough?", report.verdicts))
     return Group(table, verdict_table("is the fleet cheap enough?", report.verdicts))

@@ -19,7 +19,7 @@ from common.link.config import LinkConfig
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary, Ticks
 from common.process.heap import freeze_heap, heap_in_use
-from common.process.pacing import TickGrid
+from common.process.pacing import DueTick, TickGrid
 from common.process.ticker import ticks
 from common.skeleton import load_skeleton
 from common.wire.topics import COMMAND, STATISTICS
@@ -33,6 +33,8 @@ from master.joint_angles.sample import JointAngleSample
 Result = TypeVar("Result")
 PROFILE = "nursing"
 TURN_HZ = 50
+PARTS = 10
+"""The robots of a process take turns in so many parts."""
 APPEAR_S = 60.0
 """For all robots of a cell to be listed and claimed."""
 SETTLE_S = 2.0
@@ -62,12 +64,19 @@ def robots(endpoint: str, first: int, count: int, sessions: int) -> None:
             fleet = [LightRobot(opened[i % sessions], robot_name(first + i), skeleton) for i in range(count)]
             freeze_heap()
             # a part of them each millisecond, as robots in homes do not tick together
-            parts = [fleet[i::10] for i in range(10)]
-            async for due in ticks(TickGrid(monotonic_ns(), to_ns(1.0 / (10 * TURN_HZ)))):
-                for robot in parts[due.tick % 10]:
-                    robot.turn()
+            parts = [fleet[i::PARTS] for i in range(PARTS)]
+            async for due in ticks(TickGrid(monotonic_ns(), to_ns(1.0 / (PARTS * TURN_HZ)))):
+                for part in turns_due(due):
+                    for robot in parts[part]:
+                        robot.turn()
 
     _run(live())
+
+
+def turns_due(due: DueTick) -> list[int]:
+    """The parts whose turn it is, those that a late loop missed first: their states are to be sent too."""
+    missed = min(due.missed, PARTS - 1)
+    return [tick % PARTS for tick in range(due.tick - missed, due.tick + 1)]
 
 
 def robot_name(number: int) -> str:

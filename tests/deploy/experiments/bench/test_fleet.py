@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from common.process.pacing import DueTick
 from deploy.experiments.bench.fleet import run as fleet_run
+from deploy.experiments.bench.fleet.fit import watching_cost
 from deploy.experiments.bench.fleet.run import (
     FleetCell,
     FleetOptions,
@@ -17,6 +19,7 @@ from deploy.experiments.bench.fleet.run import (
     judge,
     measure_fleet,
 )
+from deploy.experiments.bench.fleet.workers import turns_due
 from deploy.measure.verdict import Outcome
 
 ONE = MeasuredCell(
@@ -52,11 +55,22 @@ def test_the_targets() -> None:
         measured("1 commanded + 99 watched", 7.0, 100, 1),
         measured("100 commanded", 60.1, 100, 100),
     ]
-    above, everybody, linear = judge(rows)
+    above, everybody, linear, line = judge(rows)
     assert (above.outcome, above.measured) == (Outcome.PASSED, 5.0)
     assert everybody.outcome is Outcome.FAILED
     assert linear.measured == pytest.approx(8.0)
     assert linear.outcome is Outcome.PASSED
+    assert line.outcome is Outcome.PASSED
+
+
+def test_a_fixed_part_is_told_from_the_cost_of_each() -> None:
+    found = watching_cost({0: 0.4, 10: 1.1, 100: 2.0, 300: 4.0, 1000: 11.0})
+    assert found is not None
+    assert (found.fixed_percent, found.each_percent) == pytest.approx((1.0, 0.01))
+    assert found.furthest_percent == pytest.approx(0.0, abs=1e-9)
+    bent = watching_cost({10: 1.0, 100: 1.0, 300: 9.0, 1000: 100.0})
+    assert bent is None or bent.furthest_percent > 20.0
+    assert watching_cost({10: 1.0, 100: 2.0}) is None, "two sizes lie on a line by themselves"
 
 
 def test_a_fleet_that_the_machine_could_not_serve_is_not_judged() -> None:
@@ -84,3 +98,10 @@ def test_a_small_fleet_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert one.summaries_hz > 2.0, "of all"
     assert one.commands_hz > 5.0
     assert report.tree()["verdicts"]
+
+
+@pytest.mark.parametrize(
+    ("missed", "parts"), [(0, [5]), (3, [2, 3, 4, 5]), (500, [6, 7, 8, 9, 0, 1, 2, 3, 4, 5])]
+)
+def test_a_late_loop_makes_up_for_the_turns_that_it_missed_once_each(missed: int, parts: list[int]) -> None:
+    assert turns_due(DueTick(25, 0, missed)) == parts
