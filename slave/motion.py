@@ -62,7 +62,7 @@ class RobotMotion:
 
     def accept(self, guard: Guard, command: Command, received_ns: int, now_ns: int, offset: Offset) -> None:
         """Take a command that the guard accepted: nearest posture within the site's limits ▸ tracker."""
-        self._begin_anew(guard)
+        self._begin_anew(guard, now_ns)
         asked = command.position_rad
         # by the master's own stamps: what is thought of its clock may step
         position_rad, velocity_rad_s = self.nearest.of(
@@ -75,7 +75,7 @@ class RobotMotion:
 
     def step(self, guard: Guard, now_ns: int, permission: Permission) -> Setpoint | None:
         """Where the setpoint goes in this turn of the loop; None while not every joint is seated."""
-        self._begin_anew(guard)
+        self._begin_anew(guard, now_ns)
         self.target = None
         if permission.seat_rad is not None:
             self.limiter.seat(permission.seat_rad)
@@ -123,7 +123,7 @@ class RobotMotion:
         """
         error_rad = self.limiter.limits.reachable(target.position_rad) - self.limiter.position_rad
         if permission.state is State.ALIGN:
-            most = self.pace.aligning(now_ns, permission.free)
+            most = self.pace.aligning(now_ns, error_rad, permission.free)
         else:
             most = self.pace.tracking(now_ns, error_rad, permission.free, self.damper.held_back)
         self.blind.allow(to_s(guard.times.command_timeout_ns))
@@ -143,9 +143,10 @@ class RobotMotion:
         target = self.tracker.target(at_ns)
         return None if target is None else (target.position_rad, target.velocity_rad_s)
 
-    def _begin_anew(self, guard: Guard) -> None:
+    def _begin_anew(self, guard: Guard, now_ns: int) -> None:
         """After a loss, a stop or an engage: what the operator did before must not move the robot."""
         if self._episode != guard.episode:
             self._episode = guard.episode
+            self.pace.begin(now_ns)
             self.tracker.reset()
             self.nearest.forget()

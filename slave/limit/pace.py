@@ -37,13 +37,17 @@ class Pace:
         """(J,) joints that have not come back yet."""
         self._outside_ns: NDArray[np.int64] = np.zeros(len(limits.lower_rad), np.int64)
 
-    def aligning(self, now_ns: int, valid: Mask) -> tuple[Array, Array]:
-        """Velocity and acceleration (J,) for this step of `align`.
-
-        Joints that are not valid do not align with the rest: they come back in `track`.
-        """
-        self._away = ~valid
+    def begin(self, now_ns: int) -> None:
+        """`align` begins: no joint has been near for any time."""
         self._outside_ns.fill(now_ns)
+
+    def aligning(self, now_ns: int, error_rad: Array, valid: Mask) -> tuple[Array, Array]:
+        """Velocity and acceleration (J,) for this step of `align`; `error_rad` (J,): setpoint to target.
+
+        Joints that are not valid do not align with the rest, and of the others some may have moved away from
+        the operator again: they come back in `track`.
+        """
+        self._away = self._not_yet(now_ns, error_rad, valid)
         return self._slow
 
     def tracking(self, now_ns: int, error_rad: Array, valid: Mask, held_back: Mask) -> tuple[Array, Array]:
@@ -57,8 +61,12 @@ class Pace:
         jumped = bool((valid & ~self._away & ~within(error_rad, self._jump_rad)).any())
         if not jumped and valid.all() and not self._away.any():
             return fast
+        self._away = ~valid | jumped | (self._away & self._not_yet(now_ns, error_rad, valid))
+        return np.where(self._away, self._slow[0], fast[0]), np.where(self._away, self._slow[1], fast[1])
+
+    def _not_yet(self, now_ns: int, error_rad: Array, valid: Mask) -> Mask:
+        """(J,) joints that have not been near for the dwell time."""
         outside = ~valid | ~within(error_rad, self._window_rad)
         np.copyto(self._outside_ns, now_ns, where=outside)
-        not_yet = outside | (now_ns - self._outside_ns < self._dwell_ns)
-        self._away = ~valid | jumped | (self._away & not_yet)
-        return np.where(self._away, self._slow[0], fast[0]), np.where(self._away, self._slow[1], fast[1])
+        out: Mask = outside | (now_ns - self._outside_ns < self._dwell_ns)
+        return out

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from deploy.sim.suit.motion import load_motion
 from slave.guard import State, align
 from slave.guard.align import AlignProgress
 from slave.guard.config import GuardConfig
@@ -120,6 +121,71 @@ def test_an_operator_who_does_not_hold_still_is_not_followed(rig: Any) -> None:
     assert rig.guard.state is State.HOLD
     assert "not aligned within 15 s" in rig.guard.reason
     assert rig.guard.counters.losses == {"align": 1}
+
+
+SHOULDER, ELBOW = 3, 6
+
+
+def by_turns(rig: Any, seconds: float) -> list[Any]:
+    """Shoulder and elbow move by turns, each faster than `align`, so that one of them is always away."""
+    home, steps = rig.home, []
+    for _ in range(round(seconds / 0.08)):
+        t_s = (rig.now_ns - rig.began_ns) * 1e-9
+        turn, inside = divmod(t_s, 0.8)
+        way = 0.4 * (1.0 - np.cos(2.0 * np.pi * inside / 0.8))
+        rig.target = home.copy()
+        rig.target[ELBOW if turn % 2 else SHOULDER] -= way
+        steps += rig.run(0.08)
+    return steps
+
+
+def test_an_operator_who_works_is_followed_once_each_joint_was_near(rig: Any) -> None:
+    rig.to_leased()
+    rig.home, rig.began_ns = rig.target.copy(), rig.now_ns
+    rig.engage()
+    slow = rig.config.align_velocity_rad_s
+    aligning = by_turns(rig, 2.4)
+    assert rig.guard.state is State.TRACK
+    assert max(np.abs(each.velocity_rad_s).max() for each in aligning[:100]) <= slow + 1e-12
+    fast = by_turns(rig, 4.0)
+    assert max(abs(each.velocity_rad_s[SHOULDER]) for each in fast) > 1.0
+
+
+def test_a_joint_that_is_away_when_track_begins_comes_slowly(rig: Any) -> None:
+    rig.to_leased()
+    rig.target[ELBOW] -= 0.25  # the elbow is late
+    rig.engage()
+    rig.run(0.4)
+    assert rig.guard.state is State.ALIGN
+    rig.target[SHOULDER] -= 0.6  # the shoulder has arrived, and the operator goes on
+    while rig.guard.state is State.ALIGN:
+        rig.run(0.005)
+    assert abs(rig.measured[SHOULDER] - rig.target[SHOULDER]) > 0.2, "away when track begins"
+    slow = rig.config.align_velocity_rad_s + 1e-12
+    assert max(abs(each.velocity_rad_s[SHOULDER]) for each in rig.run(1.5)) <= slow
+    rig.target[SHOULDER] += 0.5
+    assert max(abs(each.velocity_rad_s[SHOULDER]) for each in rig.run(0.5)) > 1.0, "it is back"
+
+
+@pytest.mark.parametrize("begins_s", [3.2, 8.0, 11.2])
+def test_a_working_operator_half_a_radian_of_joints_away_is_followed_soon(rig: Any, begins_s: float) -> None:
+    motion = load_motion("bottle", rig.skeleton)
+    rig.pipeline.motion.tracker = make_tracker(TrackConfig())
+    posture_rad = motion.state(begins_s)[0]
+    rig.measured = np.clip(posture_rad + 0.3, rig.skeleton.lower_rad, rig.skeleton.upper_rad)
+    rig.target = posture_rad
+    rig.to_align()
+    after_s = 0.0
+    while rig.guard.state is State.ALIGN:
+        rig.target, velocity_rad_s, _ = motion.state(begins_s + after_s)
+        for setpoint in rig.run(0.08, velocity_rad_s=velocity_rad_s):
+            moving = rig.guard.state is State.ALIGN
+            assert (
+                not moving or np.abs(setpoint.velocity_rad_s).max() <= rig.config.align_velocity_rad_s + 1e-9
+            )
+        after_s += 0.08
+    assert rig.guard.state is State.TRACK
+    assert after_s <= 3.6, "13, 8 and 5 s while all joints had to be near at one time"
 
 
 # single joints
