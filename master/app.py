@@ -87,6 +87,7 @@ class Master:
             self._pipeline.poll.identifiers,
             config.operator.zero_pose_again.key,
         )
+        only_free_running = self._only_free_running()
         self._buses = [
             CanBus(
                 bus,
@@ -94,7 +95,8 @@ class Master:
                 self._on_bus,
                 on_second_sender=self._on_frame,
                 take_extended=bus.name in with_extended(self._pipeline.poll.identifiers),
-                in_batches=bus.name in self._only_free_running(),
+                in_batches=bus.name in only_free_running,
+                on_frames=self._on_frames if bus.name in only_free_running else None,
             )
             for bus in config.capture.buses
         ]
@@ -179,6 +181,10 @@ class Master:
                 self._send(angles)
             if self._tap is not None:
                 self._tap.rest(now_ns)
+
+    def _on_frames(self, bus: str, frames: list[tuple[int, bytes, int]]) -> None:
+        """Frames of free-running nodes: the next tick reads them."""
+        self._calls.frames(bus, frames)
 
     def _on_zero_pose_key(self, key: KeyState) -> None:
         if self._pressed.take(key.down, key.presses):

@@ -96,6 +96,10 @@ class MasterPipeline:
         """Take one frame; True when every node that is not lost has answered this tick."""
         return self.poll.on_frame(bus, frame_id, data, now_ns) and self._window_open
 
+    def frames(self, bus: str, frames: list[tuple[int, bytes, int]]) -> None:
+        """Take frames of a bus of which none is awaited: identifier, data, arrival in ns."""
+        self.poll.on_frames(bus, frames)
+
     def bus_down(self, bus: str) -> None:
         """Count the nodes of a failed bus as lost: their joints are invalid until they answer again."""
         self.poll.bus_down(bus)

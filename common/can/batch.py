@@ -87,8 +87,9 @@ class BatchReader:
             vector.base, vector.length = frames + place * _FRAME_BYTES, _FRAME_BYTES
             header.vectors, header.vector_count = ctypes.pointer(vector), 1
             header.control, header.control_length = controls + place * _CONTROL_BYTES, _CONTROL_BYTES
-        self._headers = [message.header for message in self._messages]
-        self._used: list[_Header] = []
+        self._blank = bytes(self._messages)
+        """As the kernel must find it: it writes the length of what it gave into each that it used."""
+        self._used = 0
 
     def read(self) -> None:
         """Hand on all frames that wait, at most `AT_ONCE` times `MOST_CALLS`."""
@@ -97,15 +98,15 @@ class BatchReader:
                 return
 
     def _read_once(self) -> int:
-        for header in self._used:
-            header.control_length = _CONTROL_BYTES
+        ctypes.memmove(self._messages, self._blank, self._used * ctypes.sizeof(_Message))
+        self._used = 0
         count: int = self._receive(self._number, self._messages, AT_ONCE, socket.MSG_DONTWAIT, None)
         if count < 0:
             number = ctypes.get_errno()
             if number not in (errno.EAGAIN, errno.EINTR):
                 self._on_failure(can.CanOperationError(os.strerror(number), number))
             return 0
-        self._used = self._headers[:count]
+        self._used = count
         self._on_frames(self._taken(count))
         return count
 

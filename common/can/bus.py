@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import asyncio
 import errno
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict
+from functools import reduce
+from operator import or_
 
 import can
 
@@ -36,6 +38,8 @@ _NO_DATA_FRAME = _ERROR_FRAME | _REMOTE
 
 OnFrame = Callable[[str, int, bytes, int], object]
 """(bus name, identifier, data, arrival in monotonic ns)."""
+OnFrames = Callable[[str, list[tuple[int, bytes, int]]], object]
+"""(bus name, frames as above)."""
 OnRemote = Callable[[str, int, int], object]
 """(bus name, identifier, arrival in monotonic ns)."""
 Arrival = Callable[[can.Message], int]
@@ -74,17 +78,20 @@ class CanBus(KeptOpenBus):
         state_of: StateOf = state_of,
         arrived: Arrival = read_now,
         in_batches: bool = False,
+        on_frames: OnFrames | None = None,
     ) -> None:
         """`on_second_sender` takes frames with an identifier that this side sends, but did not send.
 
         `take_extended`: frames with 29 bits are handed on too; else they are counted as foreign. `on_remote`
         takes the identifiers of others' remote requests, of 11 bits. `in_batches`: where the interface can,
         frames wait until `read` is called, and then come with the times at which the kernel took them in.
+        `on_frames` takes several at once, where it is given.
         """
         self._take_extended = take_extended
         self._in_batches = in_batches and can_batch(config.interface)
         super().__init__(config, on_change, opener, state_of)
         self._on_frame = on_frame
+        self._on_frames = on_frames
         self._arrived = arrived
         self._on_second_sender = on_second_sender
         self._on_remote = on_remote
@@ -139,8 +146,13 @@ class CanBus(KeptOpenBus):
             return super()._reader_of(bus)
         return SocketReader(number, asyncio.get_running_loop(), take, failed)
 
-    def _on_batch(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
+    def _on_batch(self, frames: list[tuple[int, bytes, int]]) -> None:
         """Data frames go on at once; what is rare takes the way of a python-can message."""
+        if self._on_frames is not None and not self._doubtful and self._all_ordinary(frames):
+            self.counters.received += len(frames)
+            self._attempt = 0
+            self._on_frames(self.name, frames)
+            return
         on_frame, name, received = self._on_frame, self.name, 0
         for frame_id, data, at_ns in frames:
             if (
@@ -159,6 +171,12 @@ class CanBus(KeptOpenBus):
         if received:
             self.counters.received += received
             self._attempt = 0
+
+    def _all_ordinary(self, frames: list[tuple[int, bytes, int]]) -> bool:
+        """Whether all are data frames of others, with identifiers that are handed on."""
+        identifiers = {frame_id for frame_id, _, _ in frames}
+        rare = _NO_DATA_FRAME if self._take_extended else _NO_DATA_FRAME | EXTENDED
+        return not reduce(or_, identifiers, 0) & rare and self._sent_ids.isdisjoint(identifiers)
 
     def _on_message(self, message: can.Message) -> None:
         counters = self.counters

@@ -69,43 +69,45 @@ class Placed:
 class SignalReader:
     """Reads S signals out of rows of bytes, each row one message or several one after the other."""
 
-    def __init__(self, signals: Sequence[Placed], length: int) -> None:
-        """`length`: bytes of a row."""
+    def __init__(
+        self,
+        signals: Sequence[Placed],
+        length: int,
+        columns: Sequence[int] | None = None,
+        width: int | None = None,
+    ) -> None:
+        """`length`: bytes of a row. `columns` (S,) of the `width` that are read; all by turns without."""
         self.length = length
-        weights = np.zeros((8 * length, len(signals)))
-        for place, each in enumerate(signals):
-            signal = each.signal
+        columns = range(len(signals)) if columns is None else columns
+        width = len(signals) if width is None else width
+        self._weights = np.zeros((8 * length, width))
+        self._scale, self._offset = np.zeros(width), np.full(width, np.nan)
+        self._floats = [column for column, each in zip(columns, signals, strict=True) if each.signal.is_float]
+        for column, each in zip(columns, signals, strict=True):
+            signal, conversion = each.signal, each.signal.conversion
             powers = 2.0 ** np.arange(signal.length)
             if signal.is_signed and not signal.is_float:
                 powers[-1] = -powers[-1]
-            weights[np.array(columns_of(signal)) + each.bit, place] = powers
-        # bits of which no signal is made are left out
-        self._bits = np.flatnonzero(weights.any(axis=1))
-        self._all_bits = len(self._bits) == 8 * length
-        self._weights = weights[self._bits]
-        self._floats = [place for place, each in enumerate(signals) if each.signal.is_float]
-        conversions = [each.signal.conversion for each in signals]
-        self._scale = np.array([float(each.scale) for each in conversions])
-        self._offset = np.array([float(each.offset) for each in conversions])
-        self._factor = np.array([each.factor for each in signals])
+            self._weights[np.array(columns_of(signal)) + each.bit, column] = powers
+            self._scale[column] = float(conversion.scale) * each.factor
+            self._offset[column] = float(conversion.offset) * each.factor
 
     def read(self, rows: bytes) -> Array:
-        """Values (F, S) of F rows, in the DBC's units times the signals' factors."""
-        table = np.frombuffer(rows, np.uint8).reshape(-1, self.length)
-        bits = np.unpackbits(table, axis=1)
-        if not self._all_bits:
-            bits = bits[:, self._bits]
+        """Values (F, width) of F rows, in the DBC's units times the signals' factors.
+
+        NaN in columns of which no signal is.
+        """
+        bits = np.unpackbits(np.frombuffer(rows, np.uint8).reshape(-1, self.length), axis=1)
         values: Array = bits.astype(np.float64) @ self._weights
         if self._floats:
             # what a unit sends as NaN or infinity stays so
             with np.errstate(invalid="ignore", over="ignore"):
-                for place in self._floats:
-                    values[:, place] = _as_float(values[:, place])
-                values = (values * self._scale + self._offset) * self._factor
+                for column in self._floats:
+                    values[:, column] = _as_float(values[:, column])
+                values *= self._scale
         else:
             values *= self._scale
-            values += self._offset
-            values *= self._factor
+        values += self._offset
         return values
 
 

@@ -16,6 +16,7 @@ learnt again once two windows of arrivals agree on that: by its count alone its 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
@@ -99,7 +100,8 @@ class NodeLine:
         self._last_s = time_s
         if math.isnan(self.period_s):
             self._learn()
-        self._tune()
+        if not time_s - self._anchor_s <= _BASE_S:  # or nothing is anchored yet
+            self._tune()
         return time_s
 
     def _overtook(self, own: float) -> bool:
@@ -147,13 +149,13 @@ class NodeLine:
 
     def _count(self, took_s: float, delta: float) -> None:
         """Lost samples, and the period of a node that lost none."""
-        gone = (took_s / self.period_s if self._stamped else delta) - 1.0
-        if math.isnan(gone):
-            return
-        missed = max(round(gone), 0)
-        self.missing += missed
-        if missed == 0 and not math.isnan(self.period_s):
-            self.period_s += _SMOOTH * (took_s - self.period_s)
+        period_s = self.period_s
+        gone = (took_s / period_s if self._stamped else delta) - 1.0
+        if gone <= 0.5:
+            if not math.isnan(period_s):
+                self.period_s = period_s + _SMOOTH * (took_s - period_s)
+        elif not math.isnan(gone):
+            self.missing += round(gone)
 
     def _learn(self) -> None:
         """The first period of a node whose period is not known."""
@@ -180,8 +182,6 @@ class NodeLine:
     def _tune(self) -> None:
         """The length of a step, over `_BASE_S`."""
         ran_s = self._last_s - self._anchor_s
-        if ran_s <= _BASE_S:
-            return
         if ran_s > _BASE_S:
             step_s = ran_s / max(self._steps - self._anchor_steps, 1e-9)
             if abs(step_s / self._step_s - 1.0) < _LARGEST_DRIFT:
@@ -202,25 +202,35 @@ class ClockLines:
         self._nodes = [NodeLine(stamp_s, float(counter), period) for stamp_s, counter, period in of_each]
         self._own_is_stamp = (stamp_wrap_s > 0.0).tolist()
 
-    def take(self, rows: NDArray[np.intp], arrival_s: Array, stamp_s: Array, counts: Array) -> Array:
-        """Sample times (F,) of F samples, each node's in the order of arrival; NaN if seen before."""
-        nodes, of = self._nodes, rows.tolist()
-        newest = dict(zip(of, arrival_s.tolist(), strict=True))
+    def take(
+        self,
+        rows: Sequence[int],
+        arrival_s: Sequence[float],
+        stamp_s: Sequence[float],
+        counts: Sequence[float],
+    ) -> list[float]:
+        """Sample times of F samples, each node's in the order of arrival; NaN if seen before."""
+        nodes = self._nodes
+        newest = dict(zip(rows, arrival_s, strict=True))
         left: dict[int, int] = {}
-        for row in of:
+        for row in rows:
             left[row] = left.get(row, -1) + 1
         out = []
-        samples = zip(of, arrival_s.tolist(), stamp_s.tolist(), counts.tolist(), strict=True)
-        for row, at_s, stamp, count in samples:
+        for row, at_s, stamp, count in zip(rows, arrival_s, stamp_s, counts, strict=True):
             own = stamp if self._own_is_stamp[row] else count
             out.append(nodes[row].take(at_s, own, newest[row], left[row]))
             left[row] = -1
-        return np.array(out)
+        return out
 
     @property
     def period_s(self) -> Array:
         """(N,) from sample to sample; NaN until it is known."""
-        return np.array([node.period_s for node in self._nodes])
+        return np.array(self.periods_s)
+
+    @property
+    def periods_s(self) -> list[float]:
+        """As plain numbers."""
+        return [node.period_s for node in self._nodes]
 
     @property
     def jitter_s(self) -> Array:

@@ -5,6 +5,7 @@ frame, frame, … ─▶ samples ─ clock line ─▶ history ─ at the instan
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -20,7 +21,7 @@ from master.capture.decode import LayoutDecoder
 from master.capture.history import Instant, SampleHistory
 from master.capture.layout import MappedLayout
 from master.capture.parts import COUNTER, MAG, STAMP, Part
-from master.capture.route import Route
+from master.capture.route import Destination, Route
 from master.suit.doubt import NodeDoubt, Weight
 from master.suit.health import NodeCounters
 from master.suit.nodes import NodeConfig
@@ -29,6 +30,7 @@ _MARGIN_S = 0.002
 """Of the delay beyond the slowest node's period: a frame is late by so much at times."""
 LONGEST_DELAY_S = 0.045
 SLOWEST_HZ = 25.0
+_SLOWEST_S = 1.0 / SLOWEST_HZ
 _SLEW = 0.2
 """Share of a tick by which the instant may be moved against the tick, until the delay is as wanted."""
 _HELD_SHARE = 0.05
@@ -56,6 +58,8 @@ class FreeNodes:
         """The counters that each tick adds to; `counters` has the others too."""
         self.routes: dict[tuple[str, int], Route] = {}
         self.identifiers: dict[tuple[str, int], str] = {}
+        self._straight: dict[str, dict[int, Destination]] = {}
+        """Of each bus the identifiers that tell alone whose frame it is."""
         self._decoders: list[LayoutDecoder] = []
         self._offsets: list[NDArray[np.intp]] = []
         self._bus_of_node = [node.bus for node in nodes.values()]
@@ -69,18 +73,18 @@ class FreeNodes:
         yes = np.ones(extra, np.bool_)
         measured = np.array([layout.config.accelerometer is not None for layout in layouts], np.bool_)
         turning = np.array([layout.config.gyroscope is not None for layout in layouts], np.bool_)
-        self._period_s = self._clock.period_s
+        self._period_s = self._clock.periods_s
         self._history = SampleHistory(count, np.concatenate([measured, yes]), np.concatenate([turning, yes]))
-        self._latency_s = np.array([1e-3 * layout.config.latency_ms for layout in layouts])
+        self._latency_s = [1e-3 * layout.config.latency_ms for layout in layouts]
         self._without_mag = np.array([not node.magnetometer for node in nodes.values()], np.bool_)
+        self._some_without_mag = bool(self._without_mag.any())
         self._wanted_delay_s = delay_s
         self.delay_s = 0.0 if delay_s is None else delay_s
         """How far the instants lie before the ticks."""
         self._begin_ns: int | None = None
-        self._tick_s = np.nan
+        self._tick_s = math.nan
+        self._now_s = 0.0
         self._held_share = np.zeros(len(nodes))
-        self.age_s = np.full(len(nodes), np.inf)
-        """(n,) of each node's newest sample at the last tick."""
 
     def _open_routes(self, nodes: Sequence[NodeConfig], layouts: Sequence[MappedLayout]) -> None:
         """One decoder for all nodes of a layout whose frames have one shape, and the way to it."""
@@ -110,6 +114,9 @@ class FreeNodes:
                     self.identifiers.setdefault((node.bus, frame_id), what)
         if mistakes:
             raise ConfigError(layouts[0].config.dbc, mistakes)
+        for (bus, frame_id), route in self.routes.items():
+            if route.only is not None:
+                self._straight.setdefault(bus, {})[frame_id] = route.only
 
     @staticmethod
     def _told_apart(
@@ -121,27 +128,41 @@ class FreeNodes:
         signals = {signal.name: signal for signal in part.message.signals}
         return {name: IntegerField(signals[name]) for name in told}, tuple(told.values())
 
+    def frames(self, bus: str, frames: Sequence[tuple[int, bytes, int]]) -> list[tuple[int, bytes, int]]:
+        """Take frames of one bus: identifier, data, arrival in ns. Returns those that it does not know.
+
+        Those of which there are far too many too: `Route.frame` counts them.
+        """
+        straight, rest = self._straight.get(bus, {}), []
+        for frame in frames:
+            frame_id, data, at_ns = frame
+            to = straight.get(frame_id)
+            if to is None or not to[0].frame(to[1], data, at_ns):
+                rest.append(frame)
+        return rest
+
     def put(self, rows: NDArray[np.intp], at_ns: int, readings: Array) -> None:
         """Readings (m, 9) of the `extra` nodes with numbers `rows` (m,), sampled exactly then."""
         values = np.full((len(rows), 13), np.nan)
         values[:, :9] = readings
-        times_s = np.full(len(rows), self._s(at_ns))
-        self._history.put(rows + len(self.rows), times_s, values)
+        self._history.put((rows + len(self.rows)).tolist(), [self._s(at_ns)] * len(rows), values)
 
     def at_tick(self, tick_ns: int, now_ns: int) -> tuple[int, Instant]:
         """Take what has come; the instant that stands for the tick, ns, and what all nodes read there."""
         self._take()
-        self._period_s = self._clock.period_s
+        self._period_s, self._now_s = self._clock.periods_s, self._s(now_ns)
         tick_s = self._s(tick_ns)
         self._move_delay(tick_s)
         instant_s = tick_s - self.delay_s
-        instant = self._history.at(instant_s, self._s(now_ns), self._period_s)
+        instant = self._history.at(instant_s, self._period_s)
         free = len(self.rows)
-        instant.values[:free][self._without_mag, MAG] = np.nan
-        held = instant.held[:free]
-        self.age_s = instant.age_s[:free]
-        self.each_tick.held += held
-        self._held_share = _FORGET * self._held_share + (1.0 - _FORGET) * held
+        if self._some_without_mag:
+            instant.values[:free][self._without_mag, MAG] = np.nan
+        self._held_share *= _FORGET
+        if instant.held.any():
+            held = instant.held[:free]
+            self.each_tick.held += held
+            self._held_share += (1.0 - _FORGET) * held
         return tick_ns - round(self.delay_s * NS_PER_S), instant
 
     def _take(self) -> None:
@@ -150,10 +171,13 @@ class FreeNodes:
             samples = decoder.take()
             if samples is None:
                 continue
-            arrival_s = (samples.arrival_ns - self._begin).astype(np.float64) * 1e-9
-            values, rows = samples.values, samples.rows
-            times_s = clock.take(rows, arrival_s, values[:, STAMP], values[:, COUNTER])
-            self._history.put(rows, times_s - self._latency_s[rows], values[:, :13])
+            rows, values, begin_ns = samples.rows, samples.values, self._begin
+            arrival_s = [1e-9 * (at_ns - begin_ns) for at_ns in samples.arrival_ns]
+            stamps, counts = values[:, STAMP].tolist(), values[:, COUNTER].tolist()
+            times_s = clock.take(rows, arrival_s, stamps, counts)
+            latency_s = self._latency_s
+            times_s = [time_s - latency_s[row] for row, time_s in zip(rows, times_s, strict=True)]
+            self._history.put(rows, times_s, values[:, :13])
 
     @property
     def counters(self) -> NodeCounters:
@@ -171,10 +195,13 @@ class FreeNodes:
         step_s, self._tick_s = tick_s - self._tick_s, tick_s
         if self._wanted_delay_s is not None:
             return
-        period_s = self._period_s[: len(self.rows)]
-        known = period_s[np.isfinite(period_s) & (period_s < 1.0 / SLOWEST_HZ) & (self.age_s < 1.0)]
-        wanted_s = min(_MARGIN_S + float(known.max(initial=0.0)), LONGEST_DELAY_S)
-        most_s = np.inf if np.isnan(step_s) else _SLEW * abs(step_s)
+        since_s = tick_s - 1.0
+        # not those that are polled
+        nodes = zip(self._period_s[: len(self.rows)], self._history.newest_s(), strict=False)
+        # a period that is not known yet is NaN, and below nothing
+        known = [period_s for period_s, newest_s in nodes if period_s < _SLOWEST_S and newest_s > since_s]
+        wanted_s = min(_MARGIN_S + max(known, default=0.0), LONGEST_DELAY_S)
+        most_s = math.inf if math.isnan(step_s) else _SLEW * abs(step_s)
         self.delay_s += min(max(wanted_s - self.delay_s, -most_s), most_s)
 
     @property
@@ -190,6 +217,11 @@ class FreeNodes:
 
     def _s(self, at_ns: int) -> float:
         return 1e-9 * (at_ns - self._begin)
+
+    @property
+    def age_s(self) -> Array:
+        """(n,) of each node's newest sample at the last tick; inf before the first."""
+        return self._now_s - np.array(self._history.newest_s()[: len(self.rows)])
 
     @property
     def rate_hz(self) -> Array:

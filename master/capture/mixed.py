@@ -51,6 +51,7 @@ class MixedSuit:
         free = {row: node for row, node in enumerate(nodes) if node is not None and node.layout is not None}
         self._polled: NDArray[np.intp] = np.array(list(polled), np.intp)
         self._poll = Poll(list(polled.values()), protocol, lost_after, fd)
+        self._no_sync = protocol.sync(0)
         self._fd = dict(fd)
         kinds = [layouts[str(node.layout)] for node in free.values()]
         self._free = FreeNodes(free, kinds, len(polled), delay_s) if free else None
@@ -60,6 +61,7 @@ class MixedSuit:
         self._free_bus = [node.bus for node in free.values()]
         self._bus_of_free = frozenset(self._free_bus)
         self.identifiers = self._all_identifiers()
+        self._tick = 0
         self._tick_ns = 0
         self._values = np.zeros((self._count, 13))
         self._values[:, 6:] = np.nan
@@ -67,7 +69,11 @@ class MixedSuit:
         """The layout of each segment's node; None: tandem's own, or no node."""
         self.fused: Mask = np.array([kind is not None and kind.fused for kind in self.kinds], np.bool_)
         """(N,) nodes that give their orientation."""
-        self._lost: Mask = np.ones(self._count, np.bool_)
+        self._some_fused = bool(self.fused.any())
+        self._nothing: Mask = np.zeros(self._count, np.bool_)
+        self._rows = np.concatenate([self._free_rows, self._polled])
+        self._asks = bool(polled)
+        self._all_free = list(free) == list(range(self._count))
 
     def _all_identifiers(self) -> dict[tuple[str, int], str]:
         """What each identifier of each bus is, by bus and identifier."""
@@ -105,10 +111,10 @@ class MixedSuit:
 
     def open_window(self, tick: int, now_ns: int) -> CanFrame:
         """Begin a tick; returns the SYNC for `sync_buses`."""
-        self._tick_ns = now_ns
+        self._tick, self._tick_ns = tick, now_ns
         if self._free is not None:
             self._free.begin(now_ns)
-        return self._poll.open_window(tick, now_ns)
+        return self._poll.open_window(tick, now_ns) if self._asks else self._no_sync
 
     def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take one frame. True once every awaited node has answered this tick."""
@@ -119,50 +125,70 @@ class MixedSuit:
             return False
         return self._poll.on_frame(bus, frame_id, data, now_ns)
 
+    def on_frames(self, bus: str, frames: Sequence[tuple[int, bytes, int]]) -> None:
+        """Take frames of a bus of which no frame is awaited: identifier, data, arrival in ns."""
+        rest = frames if self._free is None else self._free.frames(bus, frames)
+        for frame_id, data, at_ns in rest:
+            self.on_frame(bus, frame_id, data, at_ns)
+
     def close_window(self, now_ns: int) -> Sweep:
         """End the tick: what all nodes read at its instant."""
-        sweep = self._poll.close_window(now_ns)
-        values = np.zeros((self._count, 13))
-        values[:, MAG] = values[:, TURN] = np.nan
-        fresh: Mask = np.zeros(self._count, np.bool_)
-        lost: Mask = np.ones(self._count, np.bool_)
-        lost[self._polled] = sweep.lost
-        sampled_ns = sweep.sampled_ns
-        if self._free is None:
-            values[self._polled, :9] = self._poll.readings
-            fresh[self._polled] = sweep.fresh
+        polled = self._poll.close_window(now_ns) if self._asks or self._poll.heard else None
+        if self._free is not None:
+            sampled_ns, rows, read, known = self._resample(self._free, polled, now_ns)
         else:
-            answered = np.flatnonzero(sweep.fresh)
-            if len(answered):
-                self._free.put(answered, self._tick_ns, self._poll.readings[answered])
-            sampled_ns, instant = self._free.at_tick(self._tick_ns, now_ns)
-            rows = np.concatenate([self._free_rows, self._polled])
-            known = instant.known & np.isfinite(instant.values[:, :6]).all(axis=1)
-            # where a node did not sample, its last readings stand
-            values[rows] = np.where(known[:, None], instant.values, self._values[rows])
-            fresh[rows] = known
-            here = known[: len(self._free_rows)]
-            self._presence.close(here, here)
+            sampled_ns, rows = self._tick_ns, self._polled
+            read = self._values[rows]
+            read[:, :9] = self._poll.readings
+            known = np.zeros(len(rows), np.bool_) if polled is None else polled.fresh
+        if self._all_free:
+            values, fresh, lost = read, known, self._presence.lost
+        else:
+            values, fresh, lost = self._values.copy(), np.zeros_like(self._nothing), ~self._nothing
+            values[rows], fresh[rows] = read, known
             lost[self._free_rows] = self._presence.lost
-            self._count_free(self._free.each_tick, here)
-        self._values, self._lost = values, lost
+            if polled is not None:
+                lost[self._polled] = polled.lost
+        self._values = values
         return Sweep(
-            tick=sweep.tick,
+            tick=self._tick,
             sampled_ns=sampled_ns,
-            frames_in_ns=sweep.frames_in_ns,
+            frames_in_ns=now_ns if polled is None else polled.frames_in_ns,
             acc_m_s2=values[:, ACC],
             gyr_rad_s=values[:, GYR],
             mag_ut=values[:, MAG],
             fresh=fresh,
             lost=lost,
-            q_world_from_sensor=values[:, TURN] if self.fused.any() else None,
+            q_world_from_sensor=values[:, TURN] if self._some_fused else None,
         )
+
+    def _resample(
+        self, free: FreeNodes, polled: Sweep | None, now_ns: int
+    ) -> tuple[int, NDArray[np.intp], Array, Mask]:
+        """The tick's instant, ns; rows of free-running and polled nodes, what they read, and which did."""
+        if polled is not None:
+            answered = np.flatnonzero(polled.fresh)
+            if len(answered):
+                free.put(answered, self._tick_ns, self._poll.readings[answered])
+        sampled_ns, instant = free.at_tick(self._tick_ns, now_ns)
+        known, read = instant.known, instant.values
+        finite = np.isfinite(read[:, :6])
+        if not finite.all():
+            known = known & finite.all(axis=1)
+        if not known.all():
+            # where a node did not sample, its last readings stand
+            read = np.where(known[:, None], read, self._values[self._rows])
+        here = known[: len(self._free_rows)]
+        self._presence.close(here, here)
+        self._count_free(free.each_tick, here)
+        return sampled_ns, self._rows, read, known
 
     def _count_free(self, counters: NodeCounters, fresh: Mask) -> None:
         counters.times_lost = self._presence.times_lost
         counters.fresh += fresh
-        counters.lost += self._presence.lost
-        counters.late += ~(fresh | self._presence.lost)
+        if not fresh.all():
+            counters.lost += self._presence.lost
+            counters.late += ~(fresh | self._presence.lost)
 
     @property
     def _free_counters(self) -> NodeCounters:
@@ -176,15 +202,18 @@ class MixedSuit:
     @property
     def saturated(self) -> Mask:
         """(N,) nodes that reported a clipped reading in the last window."""
-        out = np.zeros(self._count, np.bool_)
-        out[self._polled] = self._poll.saturated
-        return out
+        return self._of_polled(self._poll.saturated)
 
     @property
     def doubted(self) -> Mask:
         """(N,) nodes whose answers clash."""
-        out = np.zeros(self._count, np.bool_)
-        out[self._polled] = self._poll.doubted
+        return self._of_polled(self._poll.doubted)
+
+    def _of_polled(self, nodes: Mask) -> Mask:
+        if not self._asks:
+            return self._nothing
+        out = np.zeros_like(self._nothing)
+        out[self._polled] = nodes
         return out
 
     def doubts(self) -> dict[int, NodeDoubt]:

@@ -41,13 +41,15 @@ class SuitCapture:
         self._period_ns = round(1e9 / rate_hz)
         self._on_sweep = on_sweep
         extended = with_extended(source.identifiers)
+        free_running = source.buses_with_nodes - source.sync_buses
         self._buses = [
             CanBus(
                 bus,
                 self._on_frame,
                 self._on_bus,
                 take_extended=bus.name in extended,
-                in_batches=bus.name in source.buses_with_nodes - source.sync_buses,
+                in_batches=bus.name in free_running,
+                on_frames=source.on_frames if bus.name in free_running else None,
             )
             for bus in buses
         ]

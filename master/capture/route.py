@@ -15,7 +15,8 @@ class Route:
     def __init__(self) -> None:
         self._ways: list[tuple[tuple[IntegerField, ...], dict[tuple[int, ...], Destination]]] = []
         self._names: list[tuple[str, ...]] = []
-        self._only: Destination | None = None
+        self.only: Destination | None = None
+        """Where all its frames go, if no look into them is needed."""
 
     def add(self, fields: dict[str, IntegerField], values: tuple[int, ...], to: Destination) -> bool:
         """Frames whose fields have these values go `to` a decoder's slot. False: taken already."""
@@ -26,12 +27,12 @@ class Route:
         slots = self._ways[self._names.index(names)][1]
         taken = values in slots
         slots.setdefault(values, to)
-        self._only = to if len(self._ways) == 1 and not names else None
+        self.only = to if len(self._ways) == 1 and not names else None
         return not taken
 
     def frame(self, data: bytes, now_ns: int) -> bool:
         """Hand one frame on; False where there are far too many. One that is no node's changes nothing."""
-        only = self._only
+        only = self.only
         if only is not None:
             return only[0].frame(only[1], data, now_ns)
         room = True

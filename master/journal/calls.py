@@ -44,6 +44,9 @@ class Pipeline(Protocol):
     def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take one frame."""
 
+    def frames(self, bus: str, frames: list[tuple[int, bytes, int]]) -> None:
+        """Take frames of a bus of which none is awaited: identifier, data, arrival in ns."""
+
     def close(self, now_ns: int) -> JointAngleSample | None:
         """End a tick."""
 
@@ -79,6 +82,12 @@ class JournaledPipeline:
         """Take one frame."""
         self._calls.append((FRAME, bus, frame_id, data, now_ns))
         return self._pipeline.frame(bus, frame_id, data, now_ns)
+
+    def frames(self, bus: str, frames: list[tuple[int, bytes, int]]) -> None:
+        """Take frames of a bus of which none is awaited; they are written down one by one."""
+        if self._wanted():
+            self._calls += [(FRAME, bus, *frame) for frame in frames]
+        self._pipeline.frames(bus, frames)
 
     def close(self, now_ns: int) -> JointAngleSample | None:
         """End a tick."""

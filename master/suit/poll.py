@@ -140,6 +140,11 @@ class Poll:
                 self._complete_ns = now_ns
         return self._complete_ns is not None
 
+    def on_frames(self, bus: str, frames: Sequence[tuple[int, bytes, int]]) -> None:
+        """Put frames aside that end no wait: identifier, data, arrival in ns."""
+        for frame_id, data, at_ns in frames:
+            self.on_frame(bus, frame_id, data, at_ns)
+
     def close_window(self, now_ns: int) -> Sweep:
         """End the tick: decode what came, update values and health. Right when nothing came, too."""
         frames, self._frames = self._frames, []
@@ -172,6 +177,11 @@ class Poll:
         first_key = self._first_key[bus]
         self._frames = [frame for frame in self._frames if not first_key <= frame[0] < first_key + _IDS]
         self._presence.lose(np.array([name == bus for name in self._bus_of_node]))
+
+    @property
+    def heard(self) -> bool:
+        """Whether anything has come since the last window."""
+        return bool(self._frames)
 
     fused: Mask | None = None
     """No node gives its orientation itself."""

@@ -387,3 +387,29 @@ def test_a_bus_that_never_opens_can_be_closed() -> None:
         await asyncio.wait_for(scene.bus.close(), 5.0)
 
     run(test())
+
+
+@pytest.mark.parametrize(
+    ("rare", "alone"),
+    [(None, 0), (0x2000_0004, 2), (0x4000_0105, 2), (0x8000_0105, 2), (SYNC.id, 2)],
+    ids=["none", "error", "remote", "29 bits", "own identifier"],
+)
+def test_frames_go_on_together_unless_a_rare_one_is_among_them(rare: int | None, alone: int) -> None:
+    """What is rare is then taken out by the way that each frame takes alone."""
+
+    async def test() -> None:
+        scene, together = Scene(), []
+        config = BusConfig(name="suit", interface="socketcan", channel="can0")
+        bus = CanBus(
+            config, scene.on_frame, opener=scene.opener, on_frames=lambda *heard: together.append(heard)
+        )
+        bus.open()
+        bus.send(SYNC)
+        frames = [(0x105, b"1", 1), *([] if rare is None else [(rare, bytes(8), 2)]), (0x106, b"2", 3)]
+        bus._on_batch(frames)
+        assert [frame_id for _, frame_id, _ in scene.frames] == [0x105, 0x106][:alone]
+        assert together == ([("suit", frames)] if rare is None else [])
+        assert bus.counters.received == 2
+        await bus.close()
+
+    run(test())

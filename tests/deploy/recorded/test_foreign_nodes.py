@@ -95,9 +95,13 @@ class MixedBench:
         for _ in range(ticks):
             self.tick += 1
             now_ns = self.tick * PERIOD_NS
+            heard: dict[str, list[tuple[int, bytes, int]]] = {}
             while self._sent and self._sent[0].at_s * 1e9 <= now_ns:
                 one = self._sent.pop(0)
-                self.calls.frame(one.bus, one.frame.id, one.frame.data, round(one.at_s * 1e9))
+                frame = (one.frame.id, one.frame.data, round(one.at_s * 1e9))
+                heard.setdefault(one.bus, []).append(frame)
+            for bus, frames in heard.items():
+                self.calls.frames(bus, frames)
             sync, late = self.calls.tick(self.tick, now_ns)
             found += late is not None
             done = [

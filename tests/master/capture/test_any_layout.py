@@ -138,7 +138,7 @@ def test_samples_are_what_cantools_decodes(
     assert samples is not None
     assert samples.values.shape == (4 * NODES, CHANNELS)
     for row in range(NODES):
-        mine = samples.values[samples.rows == row, :6]
+        mine = samples.values[np.array(samples.rows) == row, :6]
         np.testing.assert_allclose(mine, expected[row], rtol=1e-12, atol=1e-12)
     assert (decoder.incomplete == 0).all()
 
@@ -213,7 +213,7 @@ def test_whatever_comes_in_whatever_order_no_two_samples_are_mixed(
         decoder.frame(slot, number.to_bytes(8, "little"), number)
         samples = decoder.take() if ends or number == len(order) - 1 else None
         if samples is not None:
-            for row, values in zip(samples.rows.tolist(), samples.values, strict=True):
+            for row, values in zip(samples.rows, samples.values, strict=True):
                 got.append((row, [int(values[13]), int(values[0]), int(values[3])]))
     assert sorted(got) == sorted(rule.whole)
     # what never ended may be broken already, and is counted when the node begins anew

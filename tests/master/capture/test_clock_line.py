@@ -32,11 +32,8 @@ class Node:
         own = index if own is None else own
         true_s = float(self.true_s(np.array(index)))
         at_s = true_s + 2e-4 + self.random.exponential(3e-4) if at_s is None else at_s
-        stamp, count = (
-            np.array([0.01 * own % self.wrap if self.wrap else 0.0]),
-            np.array([own % (self.wrap or 1)]),
-        )
-        return float(self.lines.take(np.array([0]), np.array([at_s]), stamp, count)[0])
+        stamp, count = 0.01 * own % self.wrap if self.wrap else 0.0, own % (self.wrap or 1)
+        return self.lines.take([0], [at_s], [stamp], [count])[0]
 
     def run(self, first: int, last: int, lose: float = 0.0) -> Array:
         """Errors of the times of many samples, s."""
@@ -63,10 +60,10 @@ def test_what_a_stall_held_back_keeps_its_times(kind: str, wrap: float) -> None:
     node = Node(kind, wrap)
     node.run(0, 400)
     last = float(node.true_s(np.array(405)))
-    rows, zero = np.zeros(6, np.intp), np.arange(400.0, 406.0)
+    zero = np.arange(400.0, 406.0)
     stamps: Array = 0.01 * zero % (node.wrap or 1.0)
     counts: Array = zero % (node.wrap or 1.0)
-    times = node.lines.take(rows, np.full(6, last + 2e-4), stamps, counts)
+    times = np.array(node.lines.take([0] * 6, [last + 2e-4] * 6, stamps.tolist(), counts.tolist()))
     assert np.abs(times - node.true_s(zero)).max() <= 1.5e-3
 
 
@@ -108,8 +105,8 @@ def test_the_line_comes_down_to_an_earlier_arrival_at_once() -> None:
 def test_samples_that_were_held_back_until_one_instant_teach_no_period(kind: str) -> None:
     """They taught a period of 0, by which the next sample was divided."""
     node = Node(kind, 256.0)
-    held = np.arange(30.0)
-    node.lines.take(np.zeros(30, np.intp), np.full(30, 5.0), held, held)
+    held = np.arange(30.0).tolist()
+    node.lines.take([0] * 30, [5.0] * 30, held, held)
     assert np.isnan(node.lines.period_s[0])
     node.run(30, 200)
     assert node.lines.period_s[0] == pytest.approx(0.01, rel=0.02)
@@ -122,8 +119,8 @@ def test_an_own_time_that_is_no_number_spoils_its_sample_alone(
 ) -> None:
     node = Node(kind, wrap, rate_hz=100.0)
     node.run(0, 300)
-    true_s, bad = float(node.true_s(np.array(300))), np.array([garbage])
-    found = node.lines.take(np.array([0]), np.array([true_s + 2e-4]), bad, bad)
+    true_s = float(node.true_s(np.array(300)))
+    found = node.lines.take([0], [true_s + 2e-4], [garbage], [garbage])
     assert found[0] == pytest.approx(true_s, abs=5e-3)
     assert np.abs(node.run(301, 1500)[600:]).max() <= 1e-3
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from common.can.frame import EXTENDED
 from common.clock import to_ns
@@ -51,7 +52,8 @@ def test_the_file_has_what_the_nodes_send() -> None:
     assert {frame.id & EXTENDED for frame in kept.frames} == {0, EXTENDED}
 
 
-def test_four_makers_nodes_on_one_bus_are_read_as_what_they_measured() -> None:
+@pytest.mark.parametrize("together", [False, True])
+def test_four_makers_nodes_on_one_bus_are_read_as_what_they_measured(together: bool) -> None:
     configs = [NodeConfig(id=number, bus="bus", layout=name) for name, number in NODES]
     suit = MixedSuit(configs, SuitProtocol.load(), LAYOUTS, 20, {"bus": False})
     kept = OtherMakers.read(FILE)
@@ -59,9 +61,15 @@ def test_four_makers_nodes_on_one_bus_are_read_as_what_they_measured() -> None:
     judged = 0
     for tick in range(1, int(SECONDS / PERIOD_S)):
         now_ns = to_ns(tick * PERIOD_S)
+        heard: list[tuple[int, bytes, int]] = []
         while waiting and waiting[0][0] <= now_ns:
             at_ns, frame = waiting.pop(0)
-            suit.on_frame("bus", frame.id, frame.data, at_ns)
+            if together:
+                heard.append((frame.id, frame.data, at_ns))
+            else:
+                suit.on_frame("bus", frame.id, frame.data, at_ns)
+        if together:
+            suit.on_frames("bus", [*heard, (0x7FF, b"", now_ns)])
         suit.open_window(tick, now_ns)
         sweep = suit.close_window(now_ns)
         if tick < 0.7 * SECONDS / PERIOD_S:
@@ -81,7 +89,7 @@ def test_four_makers_nodes_on_one_bus_are_read_as_what_they_measured() -> None:
     assert judged >= 50 * len(NODES)
     assert all(doubt.weight is Weight.NOTED for doubt in suit.doubts().values())
     assert not suit.summary()["incomplete"]
-    assert not suit.bus_health["bus"].unknown_id
+    assert suit.bus_health["bus"].unknown_id == (tick if together else 0)
 
 
 if __name__ == "__main__":
