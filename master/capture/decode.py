@@ -46,7 +46,7 @@ class NodeSamples:
 
 
 @dataclass(slots=True)
-class _Node:
+class _Gathering:
     """What has come of one node."""
 
     number: int
@@ -100,7 +100,7 @@ class LayoutDecoder:
             for place, part in zip(aside, mapped[self._needed :], strict=True)
         ]
         self._nothing_aside: list[tuple[bytes | None, int]] = [(None, _NEVER_NS)] * len(aside)
-        self._of_node = [_Node(number, list(self._nothing_aside)) for number in range(len(rows))]
+        self._of_node = [_Gathering(number, list(self._nothing_aside)) for number in range(len(rows))]
         self._whole: list[_Whole] = []
         """Since the last `take`, in the order in which they became whole."""
         self._room = _SAMPLES_A_NODE * len(rows)
@@ -143,7 +143,7 @@ class LayoutDecoder:
             self._end(node, begun, now_ns)
         return True
 
-    def _begin(self, node: _Node, data: bytes, now_ns: int) -> bool:
+    def _begin(self, node: _Gathering, data: bytes, now_ns: int) -> bool:
         if node.begun is not None:
             self.incomplete[node.number] += 1
             node.begun = None
@@ -155,7 +155,7 @@ class LayoutDecoder:
             self._end(node, begun, now_ns)
         return True
 
-    def _end(self, node: _Node, begun: list[bytes], now_ns: int) -> None:
+    def _end(self, node: _Gathering, begun: list[bytes], now_ns: int) -> None:
         heard: tuple[bytes | None, ...] = ()
         if node.aside:
             heard = tuple([data if now_ns - at_ns < _STALE_MAG_NS else None for data, at_ns in node.aside])
