@@ -11,11 +11,18 @@ import numpy as np
 from common.clock import to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from common.wire.messages import Mask
 from slave.contact.stamps import SETTLED, StampNoise
 from slave.model.build import build_model, unit_rates
 
-ROWS = 6
-"""What passes the poles: the residual, two ways to tell the model's part, torques' rise, fall and jumps."""
+ROWS = 8
+"""What passes the poles: the residual, two ways to tell the model's part, torques' rise, fall and jumps, and
+what pushes a joint up from its lower end stop or down from its upper one."""
+AT_STOP_RAD = 0.003
+"""Two counts of an output encoder. A joint that is so far beyond its limit presses into its end stop."""
+HITS_RAD_S, REBOUNDS_S = 0.5, 0.1
+"""One that comes to its limit faster than this hits the stop, however rigid that is, and leans on it for a
+while. The speed is more than one count that flickers: a joint that rests at its limit hits nothing."""
 SUDDEN = 2.0 * 0.27
 """Peak of s / (1 + s T)³ for a unit step, times T, and as much again: no drive is just as its model says."""
 LONGEST_S = 0.025
@@ -54,6 +61,7 @@ class MomentumObserver:
         self._inertial, self._bias = np.empty(self.model.nv), np.empty(self.model.nv)
         self._inertia = np.empty((self.model.nv, self.model.nv))
         self._joint_rates = np.abs(self.rates)
+        self._limits_rad = np.stack((-skeleton.lower_rad, skeleton.upper_rad))
         self.restart()
 
     def restart(self) -> None:
@@ -65,6 +73,9 @@ class MomentumObserver:
         self._position_rad, self._velocity_rad_s, self._effort_nm = np.zeros((3, joints))
         self._poles = np.zeros((3, len(self._time_constants_s), ROWS, joints))
         self._value = np.zeros((ROWS, joints))
+        self._at_stop: list[Mask] = []
+        """(2, J) which joints were at their lower, upper end stops, in the last readings."""
+        self._since_hit_s = np.full((2, joints), np.inf)
         self._unheard = False
         """Whether a torque was not known in the last reading."""
         self._stamps: list[StampNoise] = []
@@ -115,6 +126,17 @@ class MomentumObserver:
         return np.asarray(np.maximum(signed_nm, jumps_nm))
 
     @property
+    def stop_nm(self) -> Array:
+        """(T, J) what the joints' own end stops have pushed, in the residual's direction.
+
+        A joint that runs into its stop is pushed back by that, as by a person, but by a torque on this joint
+        alone. Whoever pushes it the same way meanwhile is not noticed at this joint before it has left it.
+        """
+        seen = self._poles[2]
+        out: Array = np.where(seen[:, 0] < 0.0, seen[:, 7], seen[:, 6])
+        return out
+
+    @property
     def stamp_nm(self) -> Array | float:
         """(T, J) what the errors of the readings' stamps can feign at most; 0 where stamps are exact."""
         return np.array([one.feigned_nm for one in self._stamps]) if self._stamps else 0.0
@@ -142,6 +164,7 @@ class MomentumObserver:
             return
         # the mean velocity since the last reading is that of the moment between the two
         velocity = (position_rad - self._position_rad) / step_s
+        self._at_stop = [*self._at_stop[-2:], self._stops(position_rad, velocity, step_s)]
         if self._step_s > 0.0:
             between_s = 0.5 * (self._step_s + step_s)
             effort_rate = (effort_nm - self._effort_nm) / step_s
@@ -150,6 +173,16 @@ class MomentumObserver:
             self._doubt_stamp(step_s, stamp_error_s)
         self._position_rad, self._velocity_rad_s = position_rad, velocity
         self._effort_nm, self._step_s = effort_nm, step_s
+
+    def _stops(self, position_rad: Array, velocity_rad_s: Array, step_s: float) -> Mask:
+        """(2, J) which joints are at their lower, upper end stops, at (J,) and velocities (J,)."""
+        outwards = np.array([[-1.0], [1.0]])
+        beyond_rad = outwards * position_rad - self._limits_rad
+        near = beyond_rad >= -AT_STOP_RAD
+        hits = near & (outwards * velocity_rad_s > HITS_RAD_S)
+        self._since_hit_s = np.where(hits, 0.0, self._since_hit_s + step_s)
+        out: Mask = (beyond_rad > AT_STOP_RAD) | near & (self._since_hit_s <= REBOUNDS_S)
+        return out
 
     def _advance(
         self,
@@ -178,6 +211,10 @@ class MomentumObserver:
         value[3] = np.maximum(effort_rate_nm_s, 0.0)
         value[4] = value[3] - effort_rate_nm_s
         value[5] = sudden_nm
+        # a stop may have pushed at any time between the three readings that the residual is made of
+        lower, upper = np.logical_or.reduce(self._at_stop)
+        value[6] = np.where(lower, np.maximum(value[0], 0.0), 0.0)
+        value[7] = np.where(upper, np.maximum(-value[0], 0.0), 0.0)
         unheard = math.isnan(value.sum())
         if unheard or self._unheard:
             # a joint that is heard again begins anew

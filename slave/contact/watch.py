@@ -103,6 +103,7 @@ class ContactWatch:
         """(T, J) by time constant."""
         seen, config = self.observer, self._config
         out: Array = self._floors_nm + config.model_error * seen.model_nm + seen.late_nm + seen.stamp_nm
+        out += seen.stop_nm
         return out
 
     @property

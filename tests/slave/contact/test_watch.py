@@ -22,8 +22,9 @@ STILL_RAD = np.clip(np.zeros(25), SKELETON.lower_rad, SKELETON.upper_rad)
 class Standing:
     """A robot that stands still, held by torques that may be other than what the model asks for."""
 
-    def __init__(self, config: ContactConfig | None = None) -> None:
+    def __init__(self, config: ContactConfig | None = None, stand_rad: Array = STILL_RAD) -> None:
         self.watch = ContactWatch(SKELETON, config or ContactConfig())
+        self.stand_rad = stand_rad
         self.encoders = Encoders(SKELETON)
         self.now_ns = 0
         self.needed_nm = np.zeros(25)
@@ -38,7 +39,7 @@ class Standing:
             effort = self.needed_nm - (0.0 if pushed_nm is None else pushed_nm)
             reading = EncoderReading(
                 self.now_ns,
-                self.encoders.counts(STILL_RAD),
+                self.encoders.counts(self.stand_rad),
                 np.ones(25, np.bool_),
                 effort_nm=effort if effort_nm is None else effort_nm,
             )
@@ -215,3 +216,78 @@ def test_a_mixture_whose_joints_do_not_all_have_a_drive_s_angle_is_watched() -> 
             robot.watch.look(robot.now_ns, reading, robot.encoders.position_rad(counts))
         assert robot.watch.missing(robot.now_ns) == ""
         assert (robot.watch.finding is not None) is (share > 1.0)
+
+
+ROLL = NAMES.index("right_elbow_roll")
+
+
+def standing_at(roll_rad: float) -> Standing:
+    stand_rad = STILL_RAD.copy()
+    stand_rad[ROLL] = roll_rad
+    return Standing(stand_rad=stand_rad)
+
+
+def rolled(robot: Standing, thresholds: float, ticks: int = 200) -> str | None:
+    """What is found once somebody turns the forearm with so many thresholds."""
+    pushed = np.zeros(25)
+    pushed[ROLL] = thresholds * robot.watch.least_threshold_nm[ROLL]
+    robot.run(ticks, pushed)
+    return robot.watch.finding
+
+
+def moved_to(robot: Standing, roll_rad: float) -> None:
+    robot.stand_rad = robot.stand_rad.copy()
+    robot.stand_rad[ROLL] = roll_rad
+
+
+ENDS = [(SKELETON.lower_rad, 1.0), (SKELETON.upper_rad, -1.0)]
+"""Limits, and the direction in which a stop pushes there."""
+
+
+@pytest.mark.parametrize(("end_rad", "inwards"), ENDS)
+def test_an_end_stop_that_a_joint_presses_into_is_nobody(end_rad: Array, inwards: float) -> None:
+    """It pushes back a hundred times harder than any threshold."""
+    robot = standing_at(float(end_rad[ROLL]) - 0.02 * inwards)
+    assert rolled(robot, 100.0 * inwards) is None
+    # who pushes it still once it has left its stop is noticed
+    moved_to(robot, float(end_rad[ROLL]) + 0.02 * inwards)
+    assert rolled(robot, 1.2 * inwards) is not None
+    # and so is who pushes it further into the stop
+    assert rolled(standing_at(float(end_rad[ROLL]) - 0.02 * inwards), -1.2 * inwards) is not None
+
+
+@pytest.mark.parametrize(("end_rad", "inwards"), ENDS)
+def test_a_joint_that_rests_at_its_limit_notices_a_push_both_ways(end_rad: Array, inwards: float) -> None:
+    for way in (1.2 * inwards, -1.2 * inwards):
+        assert rolled(standing_at(float(end_rad[ROLL])), way) is not None
+
+
+@pytest.mark.parametrize(("end_rad", "inwards"), ENDS)
+@pytest.mark.parametrize(("away_rad", "noticed"), [(0.0, False), (0.05, True)])
+def test_a_rigid_stop_that_a_joint_hits_is_nobody(
+    end_rad: Array, inwards: float, away_rad: float, noticed: bool
+) -> None:
+    """At 8 rad/s. Who stops a joint 3 degrees before it is noticed."""
+    end = float(end_rad[ROLL]) + away_rad * inwards
+    robot = standing_at(end + 1.6 * inwards)
+    # it begins to move as if it had been moving always
+    robot.watch.observer.restart()
+    for k in range(40):
+        moved_to(robot, end + (1.56 - 0.04 * k) * inwards)
+        robot.run(1, np.zeros(25))
+        if k == 30:
+            robot.watch.finding = None
+    robot.run(6, np.zeros(25))
+    assert (robot.watch.finding is not None) is noticed
+    if not noticed:
+        assert rolled(robot, 1.5 * inwards, ticks=100) is not None, "it leans on it for 0.1 s at most"
+
+
+def test_other_joints_feel_who_pushes_an_arm_whose_forearm_is_in_its_stop() -> None:
+    robot = standing_at(float(SKELETON.lower_rad[ROLL]) - 0.02)
+    pushed = np.zeros(25)
+    pushed[NAMES.index("right_elbow_pitch")] = -1.2 * robot.watch.least_threshold_nm[ROLL - 1]
+    pushed[ROLL] = 50.0 * robot.watch.least_threshold_nm[ROLL]
+    robot.run(200, pushed)
+    assert robot.watch.finding is not None
+    assert "right_elbow_pitch" in robot.watch.finding

@@ -14,8 +14,10 @@ from common.quaternion import Array
 from deploy.experiments.contact import hours
 from deploy.experiments.contact.flights import (
     LOADS,
+    MASS_SHARE,
     MOTIONS,
     NOTHING,
+    PAYLOAD_KG,
     READINGS,
     Flight,
     Flights,
@@ -24,8 +26,10 @@ from deploy.experiments.contact.flights import (
     shares_s,
 )
 from deploy.measure.verdict import Outcome
-from deploy.sim.patient.free_run import FreeRun
-from deploy.sim.patient.replay import Lap
+from deploy.sim.patient.free_run import FreeFlight, FreeRun
+from deploy.sim.patient.replay import Lap, held, replay
+from deploy.sim.patient.robot import Imperfect
+from slave.contact.config import ContactConfig
 
 LAP = Lap(60.0, (), 0.5, "neck_yaw")
 WHOLE = FreeRun(60.0, (), (), 0.5, "neck_yaw")
@@ -69,6 +73,21 @@ def test_table_and_tree_tell_each(short: Flights) -> None:
 def test_people_are_followed_without_a_false_stop(recordings_folder: Path) -> None:
     found = fly({"person": motions_of(recordings_folder / "motion_cmu.npz")["person"]}, 15.0, seed=1)
     assert all(verdict.outcome is Outcome.PASSED for verdict in hours.judge_flights(found))
+
+
+THROWN_S = 442.0
+"""Soon after, somebody throws his arm: what the hand holds turns the robot's forearm into its end stop."""
+
+
+def test_a_forearm_that_is_thrown_into_its_end_stop_is_no_contact(recordings_folder: Path) -> None:
+    person = motions_of(recordings_folder / "motion_cmu.npz")["person"]
+    flight = FreeFlight(lambda t_s: person(t_s + THROWN_S), Imperfect(mass_share=MASS_SHARE), ContactConfig())
+    flight.follow(6.0)
+    for name, readings in READINGS.items():
+        carries = replace(readings, payload_kg=PAYLOAD_KG)
+        lap = replay(flight.setpoints_rad, carries, ContactConfig(), held(PAYLOAD_KG))
+        assert lap.findings == (), name
+        assert lap.nearest < 0.9, name
 
 
 def test_an_hour_covers_the_whole_recording_of_people_by_each_kind_of_readings(
