@@ -59,19 +59,61 @@ def way_to_stop(velocity_rad_s: Array, brake_rad_s2: Array, dt_s: float) -> Brak
     return BrakingWay(velocity_rad_s, brake_rad_s2, dt_s, np.copysign(way, velocity_rad_s), parts, period_s)
 
 
-def next_look(apart_m: Array, spare_m: Array, stride_m: Array, parts: int = 0) -> int | None:
-    """The next moment of a way to look at; None: none, as nothing can come too near on the rest of it.
+class Looks:
+    """Which moments of a way to look at, until nothing can come too near between any two of them.
 
-    `apart_m` (K, R): how far each kind of pair may have come towards each other since the last look, in which
-    it had `spare_m` (R,). As late as no kind has gone further than its spare and its `stride_m` (R,), but one
-    moment on at least. The end of the step at hand, moment `parts` - 1, is the next setpoint: it is looked at
-    unless nothing can be too near there.
+    Of a kind of pairs that comes s towards each other from one look to the next, and has spares a and b in
+    them, the first a and the last b are free. On what is left, s - a - b, two round parts come nearer by no
+    more than they may if it is no longer than their stride. From the last look on, spares must be enough.
     """
-    last = len(apart_m) - 1
-    free: Mask = np.all(apart_m <= spare_m, axis=1)
-    if free[last]:
-        return None
-    if parts and not free[parts - 1]:
-        return parts - 1
-    allowed: Mask = np.all(apart_m <= np.maximum(spare_m, stride_m), axis=1)
-    return last if allowed[last] else max(int(np.argmin(allowed)) - 1, 0)
+
+    def __init__(self, apart_m: Array, spare_m: Array, stride_m: Array, parts: int, hope_m: float) -> None:
+        """`apart_m` (K, R): how far each kind of pair may have come towards each other by each moment.
+
+        `spare_m` (R,): what they have before the way begins; `stride_m` (R,). The first `parts` moments are
+        of the step at hand, whose end is looked at unless nothing can be too near there: it is the next
+        setpoint. A look tells spares up to `hope_m`.
+        """
+        self._apart_m, self._stride_m, self._hope_m = apart_m, stride_m, hope_m
+        self._setpoint = parts - 1
+        self._sure = -1
+        """Up to this moment the way is free."""
+        self._gone_m, self._spare_m = np.zeros_like(spare_m), spare_m
+        """(R,) how far each kind has come by then, and its spare there."""
+        self._ahead: list[tuple[int, Array]] = []
+        """Moments that were looked at and their spares (R,); the nearest last."""
+
+    def next(self, suspect: int | None = None) -> int | None:
+        """The next moment to look at; None: the way is free. First of all `suspect`, if it is of use."""
+        apart_m = self._apart_m
+        last = len(apart_m) - 1
+        while True:
+            left_m = self._gone_m + self._spare_m
+            if (apart_m[last] <= left_m).all():
+                return None
+            if suspect is not None:
+                return min(max(suspect, self._setpoint), last)
+            ahead = self._ahead[-1][0] if self._ahead else last + 1
+            if self._sure < self._setpoint < ahead and (apart_m[self._setpoint] > left_m).any():
+                return self._setpoint
+            strides_m = left_m + self._stride_m
+            if self._ahead:
+                spare_m = self._ahead[-1][1]
+                if ahead == self._sure + 1 or (apart_m[ahead] <= strides_m + spare_m).all():
+                    self._ahead.pop()
+                    self._sure, self._gone_m, self._spare_m = ahead, apart_m[ahead], spare_m
+                    continue
+                self._hope_m = 0.0  # what was hoped for did not come true: no more of that
+            # mostly there will be as much to spare as here
+            hoped_m = strides_m + np.minimum(self._spare_m, self._hope_m)
+            return self._furthest(apart_m[self._sure + 1 : ahead], hoped_m)
+
+    def _furthest(self, apart_m: Array, most_m: Array) -> int:
+        """The last moment by which no kind has come further than `most_m` (R,), but one on at least."""
+        within: Mask = np.all(apart_m <= most_m, axis=1)
+        count = len(within) if within[-1] else int(np.argmin(within))
+        return self._sure + max(count, 1)
+
+    def saw(self, moment: int, spare_m: Array) -> None:
+        """What a look at the moment that was asked for last found: spares (R,), none below 0."""
+        self._ahead.append((moment, spare_m))

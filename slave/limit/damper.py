@@ -23,7 +23,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.guard.zones import Zone, distance_model, speed_limits, zone_margins_m
-from slave.limit.braking import BrakingWay, next_look, way_to_stop
+from slave.limit.braking import BrakingWay, Looks, way_to_stop
 from slave.model.distance import CLOSE_M, DistanceModel, NearPairs
 
 TIME_CONSTANT_S = 0.1
@@ -34,9 +34,13 @@ DIP_M = 0.001
 """By so much a pair may come nearer between two looks at its way than it is at both."""
 _BENT_M = 0.25
 """Radius by which ways are bent at most, where they are long enough to matter."""
+FAR_M = 0.05
+"""Looks at the way to standstill reach no further than this."""
 MOST_ROWS = 32
 """Of one kind in one programme: those that matter most. What is left out the look at the way still sees."""
 MOST_CUTS = 2
+ABOUT_M = 0.002
+"""Once a way is not free, what has no more than this to spare later on it is kept from using it up."""
 BUDGET_NS = 3_000_000
 """A tick that has taken longer than this brakes."""
 MOST_LATE = 10
@@ -128,20 +132,18 @@ class DistanceDamper:
         """The velocity (J,) to go on with; `held_back` and `words` tell about it."""
         began_ns = self.clock()
         model = self._model
-        aim_m_s, wish_m_s = model.levers_m @ np.abs(step.aim_rad_s), model.levers_m @ np.abs(step.wish_rad_s)
-        # what neither can bring together in τ need not be found
-        fastest_m_s = max(float(aim_m_s.max(initial=0.0)), float(wish_m_s.max(initial=0.0)))
-        near = model.near(step.position_rad, TIME_CONSTANT_S * fastest_m_s + SKIN_M)
-        kind, margin_m = model.kind.take(near.pair), self._margin_m.take(near.pair)
+        model.pose(step.position_rad)
+        closing_m_s = model.closing_m_s(step.wish_rad_s)
+        # what the wish does not bring together in τ need not be found
+        near = model.near_here(TIME_CONSTANT_S * float(closing_m_s.max(initial=0.0)) + SKIN_M)
+        margin_m, closing_m_s = self._margin_m.take(near.pair), closing_m_s.take(near.pair)
         # what stands inside a margin already may not come nearer than it is
         floor_m = self._margin_m.copy()
         np.minimum.at(floor_m, near.pair, near.distance_m)
         spare_m = self._spare_m(near, floor_m)
         asked = step.wish_rad_s
-        slowed, slow = self._slowed(near, aim_m_s.take(kind), step)
-        if slowed is not step:
-            step, wish_m_s = slowed, model.levers_m @ np.abs(slowed.wish_rad_s)
-        rows = self._damping(near.distance_m - margin_m - SKIN_M, wish_m_s.take(kind), step).and_also(slow)
+        step, slow = self._slowed(near, closing_m_s, step)
+        rows = self._damping(near.distance_m - margin_m - SKIN_M, closing_m_s, step).and_also(slow)
         velocity, late = step.wish_rad_s, False
         for _ in range(MOST_CUTS + 1):
             if rows.violated_by(velocity):
@@ -220,32 +222,29 @@ class DistanceDamper:
         way = way_to_stop(velocity, step.brake_rad_s2, step.dt_s)
         # no joint turns back on the way: what each adds only grows
         apart_m = np.abs(way.gone_rad) @ model.levers_m.take(risky, 0).T
-        spare_m, stride_m, last = spare_m.take(risky), self._stride_m.take(risky), len(apart_m) - 1
-        if (apart_m[last] <= spare_m).all():
-            return None
-        suspect, suspected = -1, None
-        if self._suspect is not None:
-            suspect = min(self._suspect, last)
-            suspected, cut = self._broken_at(suspect, way, floor_m, step)
+        stride_m = self._stride_m.take(risky)
+        # what is further away than that tells no more
+        reach_m = min(max(0.5 * float(apart_m[-1].max()), CLOSE_M), FAR_M)
+        looks = Looks(apart_m, spare_m.take(risky), stride_m, way.parts, reach_m)
+        k = looks.next(self._suspect)
+        while k is not None:
+            then, cut = self._broken_at(k, reach_m, way, floor_m, step)
             if cut is not None:
-                return cut
-        k, onward = -1, next_look(apart_m, spare_m, stride_m, way.parts)
-        while onward is not None:
-            onward += k + 1
-            if suspected is not None and k < suspect <= onward:
-                k, then = suspect, suspected
-            else:
-                k = onward
-                then, cut = self._broken_at(k, way, floor_m, step)
-                if cut is not None:
-                    self._suspect = k
-                    return cut
-            if k == last:
-                break
-            ahead_m = self._spare_m(then, floor_m).take(risky)
-            onward = next_look(apart_m[k + 1 :] - apart_m[k], ahead_m, stride_m)
+                self._suspect = k
+                return self._later_too(k, cut, reach_m, way, floor_m, step)
+            looks.saw(k, self._spare_m(then, floor_m).take(risky))
+            k = looks.next()
         self._suspect = None
         return None
+
+    def _later_too(
+        self, k: int, cut: _Rows, reach_m: float, way: BrakingWay, floor_m: Array, step: DamperStep
+    ) -> _Rows:
+        """The rows of moment k, and of what comes too near later: else each took a solution of its own."""
+        last = len(way.gone_rad) - 1
+        for later in {(k + last) // 2, last} - {k}:
+            cut = cut.and_also(self._broken_at(later, reach_m, way, floor_m, step, ABOUT_M)[1])
+        return cut
 
     def _spare_m(self, near: NearPairs, floor_m: Array) -> Array:
         """(R,) how far the pairs of each kind may come towards each other, at least."""
@@ -254,16 +253,19 @@ class DistanceDamper:
         return spare_m
 
     def _broken_at(
-        self, k: int, way: BrakingWay, floor_m: Array, step: DamperStep
+        self, k: int, reach_m: float, way: BrakingWay, floor_m: Array, step: DamperStep, about_m: float = 0.0
     ) -> tuple[NearPairs, _Rows | None]:
-        """A look at moment k of a way, and rows that forbid what is too near then; None: nothing is."""
-        then = self._model.near(step.position_rad + way.gone_rad[k], CLOSE_M)
+        """A look at moment k of a way, and rows that forbid what is too near then; None: nothing is.
+
+        What is within `about_m` of being too near counts, too.
+        """
+        then = self._model.near(step.position_rad + way.gone_rad[k], reach_m)
         lack_m = floor_m.take(then.pair) - then.distance_m
-        if lack_m.max(initial=0.0) <= 0.0:
+        if lack_m.max(initial=-np.inf) <= -about_m:
             return then, None
-        worst = np.argsort(-lack_m)[: min(np.count_nonzero(lack_m > 0.0), MOST_ROWS)]
+        worst = np.argsort(-lack_m)[: min(np.count_nonzero(lack_m > -about_m), MOST_ROWS)]
         of = self._model.gradient(worst) * way.moving_s(k)
-        return then, self._possible(of, lack_m[worst] + 0.1 * SKIN_M + of @ way.velocity_rad_s, step)
+        return then, self._possible(of, lack_m[worst] + 0.3 * SKIN_M + of @ way.velocity_rad_s, step)
 
     def _nearest_to_the_aim(self, rows: _Rows, step: DamperStep) -> Array:
         """Solve for the v of min Σ ((v - aim) / v_max)² within bounds and rows.

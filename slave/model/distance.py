@@ -70,18 +70,33 @@ class _Plan:
     radius_m: Array
 
 
-class _Look:
-    """A model with its data, whose arrays are fetched once: each access would build a new view."""
+class _Speeds:
+    """How fast the two of every pair come together at most, by their velocities in one posture."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
-        self.hinge, self.axis, self.anchor = self.data.qpos, self.data.xaxis, self.data.xanchor
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self._model, self._data = model, data
+        self._rate, self._twist, self._place = data.qvel, data.cvel, data.geom_xpos
+        self._body: Indices = model.geom_bodyid.astype(np.intp)
+        self._origin, self._root = data.subtree_com, model.body_rootid.astype(np.intp).take(self._body)
+        self._first: Indices = model.pair_geom1.astype(np.intp)
+        self._second: Indices = model.pair_geom2.astype(np.intp)
+        # what is fixed does not turn: a plane has no radius
+        self._radius_m: Array = np.where(self._body > 0, model.geom_rbound, 0.0)
 
-    def at(self, hinge: Array) -> None:
-        """Find the near pairs at hinge angles (H,)."""
-        self.hinge[:] = hinge
-        mujoco.mj_kinematics(self.model, self.data)
-        mujoco.mj_collision(self.model, self.data)
+    def closing_m_s(self, hinge_rad_s: Array) -> Array:
+        """(P,): the sum of both's top speeds: of the centre, and how fast other points turn about it."""
+        self._rate[:] = hinge_rad_s
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_comVel(self._model, self._data)
+        twist = self._twist.take(self._body, 0)
+        turning = twist[:, :3]
+        moving = cross(turning, self._place - self._origin.take(self._root, 0))
+        moving += twist[:, 3:]
+        top = np.sqrt(np.einsum("ij,ij->i", moving, moving))
+        top += self._radius_m * np.sqrt(np.einsum("ij,ij->i", turning, turning))
+        out: Array = top.take(self._first)
+        out += top.take(self._second)
+        return out
 
 
 class DistanceModel:
@@ -93,8 +108,11 @@ class DistanceModel:
         """`obstacles` beside the robot's own stand, and the margin of the robot itself, then of each."""
         margins = tuple(margins_m) or (0.0,) * (1 + len(obstacles))
         plan = _plan(skeleton, tuple(obstacles), margins)
-        self._looks = {reach_m: _Look(_reaching(plan.model, reach_m)) for reach_m in _REACHES_M}
-        self._newest = self._looks[REACH_M]
+        self._models = {reach_m: _reaching(plan.model, reach_m) for reach_m in _REACHES_M}
+        self._model, self._data = plan.model, mujoco.MjData(plan.model)
+        # views of arrays are fetched once: each access would build a new one
+        self._hinge, self._axis, self._anchor = self._data.qpos, self._data.xaxis, self._data.xanchor
+        self._speeds = _Speeds(plan.model, self._data)
         self._hinges_per_joint, self._carries = plan.hinges_per_joint, plan.carries
         self._joints_of_hinges = np.ascontiguousarray(plan.hinges_per_joint.T)
         self._pair_of, self._geoms = plan.pair_of.ravel(), len(plan.pair_of)
@@ -118,11 +136,24 @@ class DistanceModel:
 
         No look reaches further than `REACH_M`.
         """
-        reach_m = next((one for one in _REACHES_M if one >= reach_m), REACH_M)
-        look = self._newest = self._looks[reach_m]
-        look.at(position_rad @ self._hinges_per_joint)
+        self.pose(position_rad)
+        return self.near_here(reach_m)
+
+    def pose(self, position_rad: Array) -> None:
+        """Go to joint angles (J,)."""
+        self._hinge[:] = position_rad @ self._hinges_per_joint
+        mujoco.mj_kinematics(self._model, self._data)
         self._moment = None
-        contact = look.data.contact
+
+    def closing_m_s(self, rate_rad_s: Array) -> Array:
+        """(P,) how fast the two of each pair come together at most, here, at joint rates (J,)."""
+        return self._speeds.closing_m_s(rate_rad_s @ self._hinges_per_joint)
+
+    def near_here(self, reach_m: float = REACH_M) -> NearPairs:
+        """The same as `near`, in the posture of the last `pose`."""
+        reach_m = next((one for one in _REACHES_M if one >= reach_m), REACH_M)
+        mujoco.mj_collision(self._models[reach_m], self._data)
+        contact = self._data.contact
         self._geom = geom = contact.geom.astype(np.intp)
         pair = self._pair_of.take(geom[:, 0] * self._geoms + geom[:, 1])
         return NearPairs(pair, contact.dist.copy(), reach_m)
@@ -136,7 +167,7 @@ class DistanceModel:
         carried = self._carries.take(geom[:, 1], 0)
         carried -= self._carries.take(geom[:, 0], 0)
         # the point midway between p and q does as well as either: they differ along n
-        return self._along(rows, self._newest.data.contact.frame[rows, :3], carried)
+        return self._along(rows, self._data.contact.frame[rows, :3], carried)
 
     def towards(self, rows: Indices, direction: Array) -> Array:
         """(rows, J): how fast the robot's points nearest to obstacles go along `direction`, (rows, 3)."""
@@ -147,9 +178,7 @@ class DistanceModel:
         carried = self._carried(rows)
         turning = rate_rad_s @ self._hinges_per_joint
         # hinges with axes h through o that turn at w:  Σ w h x (p - o) = (Σ w h) x p + Σ w (o x h)
-        out = cross(
-            carried @ (turning[:, None] * self._newest.axis), self._newest.data.contact.pos.take(rows, 0)
-        )
+        out = cross(carried @ (turning[:, None] * self._axis), self._data.contact.pos.take(rows, 0))
         out += carried @ (turning[:, None] * self._moments())
         return out
 
@@ -160,12 +189,12 @@ class DistanceModel:
 
     def _moments(self) -> Array:
         if self._moment is None:
-            self._moment = cross(self._newest.anchor, self._newest.axis)
+            self._moment = cross(self._anchor, self._axis)
         return self._moment
 
     def _along(self, rows: Indices, direction: Array, carried: Array) -> Array:
         """A hinge with axis h through o moves p along n by  n · (h x (p - o)) = h · (p x n) + n · (o x h)."""
-        turning = cross(self._newest.data.contact.pos.take(rows, 0), direction) @ self._newest.axis.T
+        turning = cross(self._data.contact.pos.take(rows, 0), direction) @ self._axis.T
         turning += direction @ self._moments().T
         turning *= carried
         out: Array = turning @ self._joints_of_hinges

@@ -32,7 +32,7 @@ class CollisionReport:
     trapped: int = 0
     """Of those, times that it did not come home either when it was led back the way it had come."""
     tick_us: list[int] = field(default_factory=lambda: [0] * len(TICK_US))
-    """Steps of the limiter by their CPU time, in `TICK_US`."""
+    """Some steps of the limiter by their CPU time, in `TICK_US`."""
 
     @property
     def motions(self) -> int:

@@ -227,7 +227,7 @@ def test_distances_of_points_are_those_that_mujoco_finds(zone: Zone) -> None:
         posture = LIMITS.reachable(draw.normal(0.0, 0.8, len(MIDDLE)))
         near = model.near(posture)
         rows = np.flatnonzero(model.obstacle[near.pair] == 0)
-        contact = model._newest.data.contact
+        contact = model._data.contact
         for row in rows[near.distance_m[rows] > 0.01]:
             middle, half = contact.pos[row], 0.5 * near.distance_m[row]
             assert zone.distance_m(middle[None])[0] == pytest.approx(half, abs=1e-4)

@@ -7,7 +7,7 @@ from common.quaternion import Array
 from slave.guard.events import Rule
 from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone, distance_model
 from slave.limit import damper
-from slave.limit.braking import next_look, way_to_stop
+from slave.limit.braking import Looks, way_to_stop
 from tests.slave.limit.apart import (
     CROSSED,
     DT_S,
@@ -253,39 +253,66 @@ def test_a_step_right_after_the_last_one_costs_no_more_than_any_other() -> None:
     assert np.abs(way_rad[-1] - continuous).max() <= 0.5 * 0.001 * float(speed.max()) + 1e-6
 
 
-def looks_at(apart_m: Array, spare_m: Array, stride_m: Array, parts: int) -> list[int]:
-    """The moments at which a way is looked at, where every look finds what the first one had to spare."""
-    looks: list[int] = []
-    onward = next_look(apart_m, spare_m, stride_m, parts)
-    while onward is not None:
-        looks.append(onward if not looks else looks[-1] + 1 + onward)
-        if looks[-1] == len(apart_m) - 1:
-            break
-        onward = next_look(apart_m[looks[-1] + 1 :] - apart_m[looks[-1]], spare_m, stride_m)
-    return looks
+def looks_at(
+    apart_m: Array,
+    spare_m: Array,
+    stride_m: Array,
+    parts: int,
+    found_m: Array | None = None,
+    suspect: int | None = None,
+) -> list[int]:
+    """The moments at which a way is looked at, where looks find `found_m` (K, R), else as at first."""
+    looks = Looks(apart_m, spare_m, stride_m, parts, hope_m=0.02)
+    moments: list[int] = []
+    k = looks.next(suspect)
+    while k is not None:
+        assert k not in moments
+        moments.append(k)
+        looks.saw(k, spare_m if found_m is None else found_m[k])
+        k = looks.next()
+    return moments
 
 
-def test_no_two_looks_at_the_way_are_further_apart_than_spare_or_stride() -> None:
-    """Whichever kind of pair it is that comes nearer, and the next setpoint is always looked at."""
-    growth = np.random.default_rng(3).uniform(0.0, 0.02, (60, 4))
-    growth[:30, 1:] *= 0.1
-    growth[30:, 0] = 0.0  # another kind than at first goes on
-    apart_m = np.cumsum(growth, axis=0)
-    spare_m, stride_m = np.array([0.001, 0.03, 0.03, 0.03]), np.array([0.04, 0.02, 0.02, 0.02])
-    looks = looks_at(apart_m, spare_m, stride_m, 2)
-    assert looks[0] == 1
-    assert (apart_m[-1] - apart_m[looks[-1]] <= spare_m).all()
-    assert (np.diff(apart_m[looks], axis=0) <= np.maximum(spare_m, stride_m)).all()
-    assert len(looks) < 35
+def test_between_two_looks_no_kind_goes_further_than_their_spares_and_its_stride() -> None:
+    """Whatever the looks find; the next setpoint is always looked at, and few looks are in vain."""
+    rng = np.random.default_rng(3)
+    count = 0
+    for _ in range(200):
+        apart_m = np.cumsum(rng.uniform(0.0, 0.02, (40, 4)) * rng.uniform(0.0, 1.0, 4), axis=0)
+        spare_m, stride_m = rng.uniform(0.001, 0.03, 4), rng.uniform(0.014, 0.04, 4)
+        found_m = rng.uniform(0.0, 0.03, (40, 4)) * (rng.random((40, 1)) < 0.7)
+        suspect = None if rng.random() < 0.5 else int(rng.integers(0, 60))
+        looks = sorted(looks_at(apart_m, spare_m, stride_m, 2, found_m, suspect))
+        count += len(looks)
+        if (apart_m[1] > spare_m).any():
+            assert 1 in looks
+        before_m, left_m, last = np.zeros(4), spare_m, -1
+        for k in looks:
+            gone_m = apart_m[k] - before_m
+            assert k == last + 1 or (gone_m <= left_m + stride_m + found_m[k] + 1e-12).all()
+            before_m, left_m, last = apart_m[k], found_m[k], k
+        assert last == 39 or (apart_m[-1] - before_m <= left_m).all()
+    assert count < 200 * 14
 
 
 def test_a_way_on_which_nothing_can_come_too_near_is_not_looked_at() -> None:
     apart_m = np.cumsum(np.full((10, 1), 0.01), axis=0)
     none = np.zeros(1)
     assert looks_at(apart_m, np.array([0.1001]), none, 1) == []
-    assert looks_at(apart_m, np.array([0.0999]), none, 1) == [8]
+    assert looks_at(apart_m, np.array([0.0999]), none, 1) == [9]
     # the next setpoint, too, only where it could be too near
     assert looks_at(apart_m, np.array([0.009]), np.array([0.2]), 1) == [0, 9]
+    # and where the way was not free the last time is looked at first
+    assert looks_at(apart_m, np.array([0.009]), np.array([0.2]), 1, suspect=5) == [5, 0, 9]
+
+
+def test_where_less_is_found_than_was_hoped_for_it_looks_in_between() -> None:
+    apart_m = np.cumsum(np.full((10, 1), 0.01), axis=0)
+    spare_m, stride_m = np.array([0.021]), np.array([0.01])
+    assert looks_at(apart_m, spare_m, stride_m, 1) == [4, 9]
+    found_m = np.full((10, 1), 0.021)
+    found_m[4] = 0.0
+    assert looks_at(apart_m, spare_m, stride_m, 1, found_m)[:2] == [4, 2]
 
 
 def test_a_thin_part_is_looked_at_so_often_that_nothing_slips_through_between_two_looks() -> None:

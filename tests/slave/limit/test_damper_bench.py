@@ -37,7 +37,7 @@ ZONES: list[Zone] = [
 @pytest.mark.parametrize("zones", [[], ZONES], ids=["itself", "zones"])
 @pytest.mark.parametrize("name", ["bottle", "crossed"])
 def test_the_damper_keeps_its_budget(name: str, zones: list[Zone], monkeypatch: pytest.MonkeyPatch) -> None:
-    model = DistanceModel(SKELETON)._newest.model
+    model = DistanceModel(SKELETON)._model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     pairs = list(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True))

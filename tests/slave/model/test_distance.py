@@ -114,3 +114,22 @@ def test_a_hand_alone_has_nothing_to_meet_and_legs_have_each_other() -> None:
     legs = distance_model(load_skeleton("lower_limb"), 2.0, []).names
     assert ("right shank", "left thigh") in legs
     assert ("right foot", "left foot") in legs
+
+
+def test_no_pair_comes_together_faster_than_its_closing_speed() -> None:
+    """Whichever joints turn, how fast; a body that is moved as a whole does not make the bound useless."""
+    model, rng, step_s = distance_model(SKELETON, 0.0, ZONES), np.random.default_rng(4), 1e-5
+    tight = 0.0
+    for posture in postures(40, seed=7):
+        rate = rng.normal(0.0, 1.0, J) * (rng.random(J) < 0.3)
+        model.pose(posture)
+        most_m_s = model.closing_m_s(rate)
+        before, after = (model.near(posture + share * rate * step_s) for share in (0.0, 1.0))
+        first, then = (np.full(len(model.names), np.inf) for _ in range(2))
+        np.minimum.at(first, before.pair, before.distance_m)
+        np.minimum.at(then, after.pair, after.distance_m)
+        both = np.isfinite(first) & np.isfinite(then)
+        closing_m_s = (first[both] - then[both]) / step_s
+        assert (closing_m_s <= most_m_s[both] + 1e-3).all()
+        tight = max(tight, float((closing_m_s / np.maximum(most_m_s[both], 1e-9)).max()))
+    assert tight > 0.5
