@@ -21,14 +21,14 @@ from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance
 from common.wire.messages import ClockReply, ControlReply, StateHead, Statistics
 from common.wire.presence import ProcessPresence
-from common.wire.topics import CLOCK, COMMAND, CONTROL, IN_ORDER, KEYFRAME, LOST, STATE, STATISTICS, VIDEO
+from common.wire.topics import CLOCK, COMMAND, CONTROL, IN_ORDER, LOST, STATE, STATISTICS, keyframe, video
 from master.alarms.situation import RobotSign
 from master.comfort.scaling import MotionScaling
 from master.deadman.grip import Grip
 from master.homonyms import Homonyms
 from master.joint_angles.sample import JointAngleSample
 from master.lease import LeaseKeeper
-from master.picture import VideoWatch
+from master.picture import CamerasWatch
 from master.pipeline import CommandWriter
 from master.robot_watch import RobotWatch
 from master.watched import TakenRobot
@@ -87,10 +87,10 @@ class CommandedRobot:
         self._throttle = LogThrottle()
         self._put_command: Callable[[bytes], None] = link.publish(COMMAND.of(operator))
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
-        self._put_keyframe: Callable[[bytes], None] = link.publish(KEYFRAME)
-        self.video = VideoWatch()
+        self._put_keyframe: dict[str, Callable[[bytes], None]] = {}
+        self.video = CamerasWatch()
         link.subscribe(STATE, self._on_state)
-        link.subscribe(VIDEO, self.video.on_payload, in_order=IN_ORDER)
+        link.subscribe_keys(video("*"), self.video.on_payload, in_order=IN_ORDER)
         link.watch_presence(self._on_presence)
 
     async def run(self) -> None:
@@ -110,8 +110,13 @@ class CommandedRobot:
         seen = self.video.seen_by(angles.sampled_ns)
         command = self._writer.write(angles, self._lease.token, grip, angles_ns, monotonic_ns(), seen)
         self._put_command(encode(command))
-        if self.video.asks_for_key(monotonic_ns()):
-            self._put_keyframe(LOST)
+        for camera in self.video.asks_for_key(monotonic_ns()):
+            self._ask_for_key(camera)
+
+    def _ask_for_key(self, camera: str) -> None:
+        if camera not in self._put_keyframe:
+            self._put_keyframe[camera] = self._link.publish(keyframe(camera))
+        self._put_keyframe[camera](LOST)
 
     def publish_metrics(self, now_ns: int, shared: MasterMetrics) -> None:
         """Publish what the master counted, with what it counted of this robot alone."""

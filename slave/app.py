@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import threading
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
@@ -40,16 +39,13 @@ from common.wire.topics import (
     STATISTICS,
     STOP,
     SUMMARY,
-    keyframe,
-    video,
 )  # fmt: skip
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
 from slave.call_button import CallButton
-from slave.camera.feed import CameraFeed, open_feed
+from slave.camera.cameras import open_cameras
 from slave.config import SlaveConfig
 from slave.guard.body import Body
-from slave.guard.eyes import video_loss
 from slave.guard.states import State
 from slave.guard.tilt import base_loss
 from slave.last_known import EVERY_S, LastKnown, state_file
@@ -106,19 +102,9 @@ class Slave:
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
         self._put_summary: Callable[[bytes], None] = link.publish(SUMMARY)
         self._button = None if config.call.button is None else CallButton(config.call.button, self._on_button)
-        self._camera: CameraFeed | None = None
-        if config.camera.source != "off":
-            looked_at = threading.Event()
-
-            def look(wanted: bool) -> None:
-                # a recorder at the tap hears what the link would send
-                (looked_at.set if wanted or tap is not None else looked_at.clear)()
-
-            put = link.publish(video(config.camera.name), look)
-            self._camera = open_feed(config.camera, config.profile, put, looked_at.is_set)
-            self._pipeline.on_accepted = self._camera.on_command
-            camera = self._camera
-            link.subscribe(keyframe(config.camera.name), lambda payload, _: camera.on_keyframe(payload))
+        # a recorder at the tap hears what the link would send
+        self._cameras = open_cameras(config.camera.all, config.profile, link, always=tap is not None)
+        self._pipeline.on_accepted = self._cameras.on_command
         link.subscribe_keys(COMMAND, self._on_command)
         link.answer_keys(CONTROL, self._on_control)
         link.answer(STOP, self._on_stop)
@@ -136,7 +122,7 @@ class Slave:
         endpoints = own_endpoints(self._config.link)
         profile = self._config.skeleton.name
         self._link.declare_alive("slave", self._pipeline.instance, endpoints, profile)
-        with self._camera or nullcontext(), self._button or nullcontext():
+        with self._cameras, self._button or nullcontext():
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._drive())
                 tasks.create_task(self._publish_statistics())
@@ -175,9 +161,8 @@ class Slave:
                 self._pipeline.written(monotonic_ns())
             if self._tap is not None:
                 self._hand_on(self._tap, reading, setpoint)
-            if self._camera is not None:
-                self._camera.look(self._pipeline.position_rad, reading.read_ns)
-                self._pipeline.camera_fault = self._camera.fault
+            self._cameras.look(self._pipeline.position_rad, reading.read_ns)
+            self._pipeline.camera_fault = self._cameras.fault
             # a missed tick's state is published by the next one, or an overloaded robot would seem dead
             if due.tick // loop.state_every != published:
                 published = due.tick // loop.state_every
@@ -209,8 +194,7 @@ class Slave:
         now_ns = monotonic_ns()
         base = None if self._base is None else base_loss(attitude, now_ns, self._config.guard)
         stops = {} if self._stops is None else self._stops.read(now_ns)
-        seen_ns = None if self._camera is None else self._camera.sight.captured_ns
-        video = video_loss(seen_ns, now_ns, self._config.guard)
+        video = self._cameras.loss(now_ns, self._config.guard)
         return Body(self._servos.faults(), base, stops=stops, video=video)
 
     def _brake_drives(self, stop: bool) -> None:
@@ -266,7 +250,8 @@ class Slave:
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
             base=self._base.counters() if self._base else {},
             servos=servo_metrics(self._servos, self._config),
-            video=self._camera.metrics() if self._camera else None,
+            video=self._cameras.main_metrics(),
+            other_videos=self._cameras.other_metrics(),
             link=self._link.counters(),
             paths=self._link.paths,
         )

@@ -18,7 +18,7 @@ from common.skeleton.load import ProfileName
 from common.tap.config import TapConfig
 from slave.attitude.config import BaseConfig
 from slave.backends import ServosConfig
-from slave.camera.config import CameraConfig
+from slave.camera.config import Cameras, CamerasConfig
 from slave.contact.config import ContactConfig
 from slave.encoders.counts import EncoderConfig
 from slave.guard.config import GuardConfig
@@ -57,7 +57,7 @@ class SlaveConfig(Section):
     servos: ServosConfig = ServosConfig()
     encoders: EncoderConfig = EncoderConfig()
     base: BaseConfig = BaseConfig()
-    camera: CameraConfig = CameraConfig()
+    camera: Cameras = CamerasConfig()
     link: LinkConfig
     clock: ClockConfig = ClockConfig()
     process: ProcessConfig = ProcessConfig()
@@ -87,6 +87,7 @@ class SlaveConfig(Section):
             *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),
             *self._too_fresh_pictures(),
+            *self.camera.mistakes(),
             *self.link.mistakes(),
             *self.tap.mistakes(),
             *self.console.mistakes(),
@@ -95,8 +96,9 @@ class SlaveConfig(Section):
 
     def _too_fresh_pictures(self) -> list[ConfigMistake]:
         """A camera on a poor link sends rarely: the limit must leave it the time."""
-        limit_s, slowest_s = self.guard.max_video_age_s, 1.0 / self.camera.least_rate_hz
-        if self.camera.source == "off" or not limit_s or limit_s >= 2.0 * slowest_s:
+        limit_s, relied_on = self.guard.max_video_age_s, [one for one in self.camera.all if one.relied_on]
+        slowest_s = max((1.0 / one.least_rate_hz for one in relied_on), default=0.0)
+        if not limit_s or limit_s >= 2.0 * slowest_s:
             return []
         expected = f"0 (never), or at least {2.0 * slowest_s:g}: two pictures at camera.least_rate_hz"
         return [ConfigMistake("guard.max_video_age_s", limit_s, expected)]

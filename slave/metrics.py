@@ -25,6 +25,7 @@ def slave_metrics(
     base: Mapping[str, int],
     servos: ServoMetrics,
     video: CameraMetrics | None,
+    other_videos: dict[str, CameraMetrics],
     link: dict[str, TopicCounters],
     paths: str = "",
 ) -> SlaveMetrics:
@@ -50,6 +51,7 @@ def slave_metrics(
         base=dict(base),
         servos=servos,
         video=video,
+        other_videos=other_videos,
         link=link,
         paths=paths,
         contact_from="" if pipeline.contact.missing(now_ns) else pipeline.contact.dull,

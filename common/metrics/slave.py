@@ -200,5 +200,7 @@ class SlaveMetrics(Metrics):
     rate: RateMetrics | None = None
     paths: str = ""
     """Of two paths, which one does not carry and why; see `[link.twin]`."""
+    other_videos: dict[str, CameraMetrics] = field(default_factory=dict)
+    """Of the cameras beside the main one, by name."""
     access: AccessMetrics | None = None
     """In the file at the end only."""

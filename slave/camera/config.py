@@ -1,17 +1,18 @@
-"""`[camera]`: what the operator sees, and how much of the link it may take."""
+"""`[camera]`, or up to three `[[camera]]`: what the operator sees, and how much of the link it may take."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from common.config.section import Section
+from common.errors import ConfigMistake
 from common.wire.topics import VIDEO_NAME
 
 
 class CameraConfig(Section):
-    """`[camera]` of the slave's TOML."""
+    """One camera of the slave's TOML."""
 
     source: Literal["off", "robot", "v4l2"] = "off"
     """`robot`: through the eyes of the simulated robot, drawn from the encoders; `v4l2`: a real camera."""
@@ -36,3 +37,39 @@ class CameraConfig(Section):
     """Size of one picture at best, kB."""
     time_card: bool = False
     """With `robot`: a card before the lens shows the time, by which the latency to the eye is measured."""
+    relied_on: bool = True
+    """Whether the robot holds by `[guard] max_video_age_s` when the operator's picture of it grows old."""
+
+
+class CamerasConfig(CameraConfig):
+    """All cameras: the main one, and those beside it."""
+
+    others: list[CameraConfig] = Field(default_factory=list, max_length=2)
+
+    @property
+    def all(self) -> list[CameraConfig]:
+        """Those that are not off, the main one first."""
+        main = CameraConfig.model_validate(self.model_dump(exclude={"others"}))
+        return [one for one in (main, *self.others) if one.source != "off"]
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Each name, and each real camera's device, once."""
+        found = []
+        for key, values in (
+            ("name", [one.name for one in self.all]),
+            ("device", [one.device for one in self.all if one.source == "v4l2"]),
+        ):
+            twice = sorted({value for value in values if values.count(value) > 1})
+            expected = f"a {key} that no other camera has"
+            found += [ConfigMistake(f"camera.{key}", value, expected) for value in twice]
+        return found
+
+
+def _of_list(value: object) -> object:
+    """`[[camera]]`: the first is the main one."""
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return {**value[0], "others": value[1:]}
+    return value
+
+
+Cameras = Annotated[CamerasConfig, BeforeValidator(_of_list)]

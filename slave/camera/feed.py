@@ -35,7 +35,9 @@ _KEY_AGAIN_NS = 300 * NS_PER_MS
 _IDLE_S = 0.25
 _JOIN_S = 1.0
 _BUSY_SHARE = 0.5
-"""The share of one core that making pictures may take."""
+"""The share of one core that making pictures may take, all cameras together."""
+_NUMBERS = 1 << 48
+"""From the numbers of one camera to those of the next: 9000 years of milliseconds."""
 
 log = logging.getLogger(__name__)
 
@@ -71,11 +73,16 @@ class CameraFeed:
         clock: Clock = monotonic_ns,
         make_rate: Callable[[RateLimits], RateControl] = RateControl,
         wanted: Callable[[], bool] = lambda: True,
+        place: tuple[int, int] = (0, 1),
     ) -> None:
         """`put` must be safe in another thread than the loop's, and must not block.
 
-        `wanted`: whether somebody receives the pictures; while nobody does, none is made.
+        `wanted`: whether somebody receives the pictures; while nobody does, none is made. `place`: which
+        camera it is, from 0, of how many: they share the link and a core.
         """
+        index, cameras = place
+        self.name = config.name
+        self.relied_on = config.relied_on
         self._wanted = wanted
         self.sight = Sight()
         self.fault = ""
@@ -87,8 +94,9 @@ class CameraFeed:
             RateLimits(
                 config.most_rate_hz,
                 config.least_rate_hz,
-                to_ns(config.most_delay_s),
+                to_ns(config.most_delay_s) // cameras,
                 round(1000 * config.most_kb),
+                cameras,
             )
         )
         self._angles: tuple[Array, int] | None = None
@@ -97,7 +105,9 @@ class CameraFeed:
         self._stopping = False
         self._camera: CameraSource | None = None
         # above any number of an earlier run since this host started, which the master may still acknowledge
-        self._number = clock() // NS_PER_MS
+        # each camera has numbers of its own: a command acknowledges one picture, by its number alone
+        self._number = clock() // NS_PER_MS + index * _NUMBERS
+        self._busy_share = _BUSY_SHARE / cameras
         self._count = _Count(clock())
         self._codec = config.codec
         self._keyframe_ns = to_ns(config.keyframe_s)
@@ -205,7 +215,7 @@ class CameraFeed:
                 continue
             reply = camera.ask(PictureRequest(angles[1], self._rate.budget_bytes, angles[0], alone))
             made_ns = self._clock()
-            rest_until_ns = now_ns + round((made_ns - now_ns) / _BUSY_SHARE)
+            rest_until_ns = now_ns + round((made_ns - now_ns) / self._busy_share)
             self._make.record(made_ns - now_ns)
             self._send(reply)
             self.fault = ""
@@ -250,7 +260,7 @@ class CameraFeed:
 
     def _report(self, words: str) -> None:
         if not self._stopping and words != self.fault:
-            log.warning("no video: %s", words)
+            log.warning("no video of camera %s: %s", self.name, words)
             self.fault = words
 
     def _pause(self, seconds: float) -> None:
@@ -261,10 +271,14 @@ class CameraFeed:
 
 
 def open_feed(
-    config: CameraConfig, profile: str, put: Callable[[bytes], None], wanted: Callable[[], bool]
+    config: CameraConfig,
+    profile: str,
+    put: Callable[[bytes], None],
+    wanted: Callable[[], bool],
+    place: tuple[int, int] = (0, 1),
 ) -> CameraFeed:
-    """The configured camera's feed, not yet started."""
-    return CameraFeed(config, put, lambda: CameraProcess(profile, config), wanted=wanted)
+    """The feed of one configured camera, not yet started; `place` as of `CameraFeed`."""
+    return CameraFeed(config, put, lambda: CameraProcess(profile, config), wanted=wanted, place=place)
 
 
 class _Count:

@@ -27,7 +27,7 @@ class CameraProcess:
 
     def __init__(self, profile: str, config: CameraConfig, command: Sequence[str] | None = None) -> None:
         """Start it; `command` stands in for it in tests. Raises RobotError where it cannot be started."""
-        setting = f"{profile} {config.model_dump_json()}"
+        setting = f"{profile} {config.model_dump_json(exclude={'others'})}"
         started = command or (sys.executable, "-m", "slave.camera", setting)
         try:
             self._process = subprocess.Popen(

@@ -3,21 +3,24 @@
 Additive increase, multiplicative decrease (Chiu and Jain 1989) of a picture's size, steered by the delay
 that the picture itself met, as LEDBAT (RFC 6817) does: its transit less that of the clocks' quickest
 exchange, which is all but empty. A link keeps what it cannot send at once in a queue, and a state sent behind
-a picture waits as long as the picture's last byte. So that wait is what is bounded. At most two pictures are
-under way at a time.
+a picture waits as long as the picture's last byte. So that wait is what is bounded. Two pictures are under
+way at a time, or as many as are due until the next acknowledgement can come. Several cameras divide the wait
+and the link's time among them, and each is steered by itself: one that stands still takes nothing of theirs.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 LEAST_BYTES = 1500
 _MORE_BYTES = 500
 _LESS = 0.6
 _SLOWER, _FASTER = 1.5, 0.7
-_WINDOW = 2
 _SHARE = 0.5
-"""The share of the link's time that pictures may take."""
+"""The share of the link's time that the pictures of all cameras may take."""
+_COMMAND_S = 0.08
+"""From one command, which acknowledges the pictures of one camera, to the next."""
 _USED = 0.6
 """A picture that needed less of its budget says nothing about a larger one."""
 _LOST_NS = 1_000_000_000
@@ -31,6 +34,13 @@ class RateLimits:
     least_rate_hz: float
     most_delay_ns: int
     most_bytes: int
+    cameras: int = 1
+    """How many share the link, and the commands that acknowledge their pictures."""
+
+    @property
+    def window(self) -> int:
+        """Pictures that may be under way: those due until the next acknowledgement, and one more."""
+        return max(2, 1 + math.ceil(self.most_rate_hz * _COMMAND_S * self.cameras))
 
 
 @dataclass(slots=True)
@@ -66,7 +76,7 @@ class RateControl:
     def due_ns(self, now_ns: int) -> int | None:
         """When the next picture may be sent; None while as many are under way as may be."""
         self._give_up(now_ns)
-        if len(self._under_way) >= _WINDOW:
+        if len(self._under_way) >= self._limits.window:
             return None
         if self._last_sent_ns is None:
             return now_ns
@@ -87,7 +97,7 @@ class RateControl:
         self._under_way = {n: s for n, s in self._under_way.items() if n > number}
         if sent is None or delay_ns is None:
             return
-        self._rest_until_ns = sent.sent_ns + round(delay_ns / _SHARE)
+        self._rest_until_ns = sent.sent_ns + round(self._limits.cameras * delay_ns / _SHARE)
         if delay_ns > self._limits.most_delay_ns:
             if sent.sent_ns > self._lowered_ns:  # what was sent before the last step down taught it already
                 self._lower(now_ns)

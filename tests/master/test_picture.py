@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from common.metrics.master import VideoReceived
 from common.wire.video import VideoFrame, encode_frame
-from master.picture import VideoWatch
+from master.picture import MOST_CAMERAS, CamerasWatch, VideoWatch
 
 MS = 1_000_000
 
@@ -68,3 +68,38 @@ def test_a_robot_that_started_anew_may_count_from_below() -> None:
     watch.on_payload(payload(500), 0)
     watch.on_payload(payload(3), 2500 * MS)
     assert watch.seen_by(3000 * MS) == (3, 2500 * MS)
+
+
+def key(camera: str) -> str:
+    return f"tandem/robot-1/video/{camera}"
+
+
+def test_each_command_acknowledges_the_next_camera_that_has_a_new_picture() -> None:
+    watch = CamerasWatch()
+    assert watch.seen_by(10**12) == (0, 0)
+    for number, camera in enumerate(("head", "hand", "room"), start=1):
+        watch.on_payload(key(camera), payload(100 * number), number)
+    assert [watch.seen_by(10)[0] for _ in range(3)] == [100, 200, 300]
+    watch.on_payload(key("hand"), payload(201), 11)
+    watch.on_payload(key("head"), payload(101), 12)
+    # the room's camera stands still: it takes no turn while others have something new
+    assert [watch.seen_by(20)[0] for _ in range(2)] == [101, 201]
+    watch.on_payload(key("hand"), payload(202), 21)
+    assert watch.seen_by(30)[0] == 202, "the only one with a new picture, although it has waited least"
+    # nothing is new: each still says, in turn, what the operator has
+    assert sorted(watch.seen_by(30)[0] for _ in range(3)) == [101, 202, 300]
+
+
+def test_no_more_cameras_are_kept_than_a_robot_may_have() -> None:
+    watch = CamerasWatch()
+    for number in range(10):
+        watch.on_payload(key(f"c{number}"), payload(number + 1), number)
+    assert watch.metrics() == VideoReceived(MOST_CAMERAS, 0, 0, 0)
+
+
+def test_a_picture_that_builds_on_a_lost_one_is_asked_for_of_its_own_camera_alone() -> None:
+    watch = CamerasWatch()
+    watch.on_payload(key("head"), payload(1), 1)
+    broken = VideoFrame(9, 9, 9, 320, 240, b"\x00\x00\x00\x01", "h264", 8)
+    watch.on_payload(key("hand"), encode_frame(broken), 2)
+    assert watch.asks_for_key(3) == ["hand"]

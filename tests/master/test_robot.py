@@ -59,6 +59,8 @@ class FakeLink:
     def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None], in_order: int = 0) -> None:
         self.hear[topic.name] = on_payload
 
+    def subscribe_keys(self, *_: object, **__: object) -> None: ...
+
     def declare_alive(self, role: str, instance: int, endpoints: Sequence[str]) -> None: ...
 
     def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None]) -> None:

@@ -21,7 +21,7 @@ from common.wire.codec import decode
 from common.wire.messages import Command, CommandStamps, Statistics
 from common.wire.topics import Topic
 from slave import app
-from slave.camera.config import CameraConfig
+from slave.camera.config import CameraConfig, CamerasConfig
 from slave.config import SlaveConfig
 from slave.contact.config import ContactConfig
 from slave.limit.limit import Setpoint
@@ -233,13 +233,13 @@ def test_the_servo_loop_feeds_the_watchdog_at_the_end_of_each_tick(
     assert len(beats) == 2  # the tick that hung did not count
 
 
-def camera_slave(source: Literal["off", "robot"]) -> app.Slave:
+def camera_slave(source: Literal["off", "robot"], *beside: CameraConfig) -> app.Slave:
     link: Any = FakeLink()
     servos: Any = StillServos()
     config = SlaveConfig(
         robot="robot-1",
         link=LinkConfig(listen=["tcp/127.0.0.1:7447"]),
-        camera=CameraConfig(source=source),
+        camera=CamerasConfig(source=source, others=list(beside)),
     )
     return app.Slave(config, link, servos)
 
@@ -256,8 +256,7 @@ def test_the_age_of_the_picture_that_the_operator_has_reaches_the_guard(
     monkeypatch.setattr(app, "monotonic_ns", lambda: now_ns)
     slave = camera_slave("robot")
     most_s = slave._config.guard.max_video_age_s
-    camera, accepted = slave._camera, slave._pipeline.on_accepted
-    assert camera is not None
+    (camera,), accepted = slave._cameras.feeds, slave._pipeline.on_accepted
     assert accepted is not None
     offset = Offset(0, 0, trusted=True)
     camera.sight.sent(7, now_ns, now_ns)
@@ -274,7 +273,30 @@ def test_the_age_of_the_picture_that_the_operator_has_reaches_the_guard(
     assert slave._body().video is None, "another operator, who has none"
 
 
+def test_the_camera_that_stands_still_is_named_and_one_that_nobody_relies_on_holds_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now_ns = to_ns(1000.0)
+    monkeypatch.setattr(app, "monotonic_ns", lambda: now_ns)
+    room = CameraConfig(source="robot", name="room", relied_on=False)
+    slave = camera_slave("robot", CameraConfig(source="robot", name="hand"), room)
+    head, hand, beside = slave._cameras.feeds
+    accepted = slave._pipeline.on_accepted
+    assert accepted is not None
+    offset = Offset(0, 0, trusted=True)
+    for number, feed in enumerate((head, hand, beside), start=7):
+        feed.sight.sent(number, now_ns, now_ns)
+        accepted(command(number), now_ns, offset)
+    now_ns += to_ns(2.0 * slave._config.guard.max_video_age_s)
+    head.sight.sent(20, now_ns, now_ns)
+    accepted(command(20), now_ns, offset)
+    assert (slave._body().video or "").startswith("camera hand: the operator's newest picture is")
+    hand.sight.sent(21, now_ns, now_ns)
+    accepted(command(21), now_ns, offset)
+    assert slave._body().video is None
+
+
 def test_a_robot_without_a_camera_waits_for_no_picture() -> None:
     slave = camera_slave("off")
-    assert slave._pipeline.on_accepted is None
+    assert slave._cameras.feeds == []
     assert slave._body().video is None

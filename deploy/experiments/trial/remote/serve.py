@@ -180,7 +180,8 @@ class RobotHost:
         stack.push_async_callback(self._child.stop)
         overrides = [
             f'link.listen=["{there}", "{here}"]', "link.connect=[]", 'link.mode="peer"',
-            f'track.strategy="{start.strategy}"', f"guard.max_age_s={start.max_age_s}", 'camera.source="off"',
+            f'track.strategy="{start.strategy}"', f"guard.max_age_s={start.max_age_s}",
+            'camera={ source = "off" }',
         ]  # fmt: skip
         await self._child.start(self._options.config, overrides)
         deadline_ns = monotonic_ns() + to_ns(UP_S)

@@ -22,7 +22,7 @@ from common.wire.messages import Action, ClockReply, Command, CommandStamps, Con
 from common.wire.topics import STATE, Topic
 from slave import app
 from slave.backends import ServosConfig
-from slave.camera.config import CameraConfig
+from slave.camera.config import CamerasConfig
 from slave.config import SlaveConfig
 from slave.guard.body import Body
 from slave.guard.states import State
@@ -46,7 +46,7 @@ def slave_config(rig: Rig) -> SlaveConfig:
         link=LinkConfig(listen=["tcp/127.0.0.1:7447"]),
         servos=ServosConfig(backend="dynamixel", dynamixel=rig.config),
         encoders=rig.encoder_config,
-        camera=CameraConfig(source="off"),
+        camera=CamerasConfig(source="off"),
     )
 
 
