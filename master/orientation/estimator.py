@@ -22,7 +22,7 @@ from master.orientation.fused import FUSED
 from master.orientation.heading import HeadingMemory
 from master.orientation.heading_watch import constrained, watch_of
 from master.orientation.joints.online import EVERY, OnlineHeadings
-from master.orientation.liveness import Liveness
+from master.orientation.liveness import Changes, Liveness
 from master.orientation.lowpass import LowPass
 from master.orientation.zero_pose import ZeroPose, ZeroPoseLimits
 from master.orientation.zero_pose_again import ZeroPoseAgain
@@ -165,15 +165,8 @@ class Estimator:
         samples[ACC], samples[GYR], samples[MAG] = readings.acc_m_s2, readings.gyr_rad_s, readings.mag_ut
         was_valid = self._liveness.settled
         changes = self._liveness.update(readings.fresh, readings.lost)
-        if changes.went.any():
-            self._heading.lose(changes.went & was_valid, self._q_of_filters())
-            if self._beside is not None:
-                self._beside.lose(changes.went & was_valid, self._bank.q_inertial_from_sensor())
-        if not self._liveness.alive.all():
-            self._idle(~self._liveness.alive)
-        if changes.came.any():
-            self._lowpass.restart(changes.came)
-            self._bank.restart(changes.came)
+        if changes is not self._liveness.unchanged:
+            self._follow(changes, was_valid)
         np.copyto(self._gyr_before_rad_s, self._gyr_rad_s)  # the low-pass writes into the same memory again
         # absurd readings may overflow here; the filters leave them out
         with np.errstate(over="ignore", invalid="ignore"):
@@ -186,7 +179,7 @@ class Estimator:
             self._lowpass.restart(spoilt)
             self._gyr_rad_s = np.where(spoilt[:, None], self._bank.bias_rad_s(), self._gyr_rad_s)
             self._gyr_before_rad_s[spoilt] = self._gyr_rad_s[spoilt]
-        if changes.settled.any():
+        if changes is not self._liveness.unchanged and changes.settled.any():
             self._find(changes.settled, np.isfinite(filtered[MAG, :, 0]))
         if not self._zero_pose.known.all():
             self._stand(filtered[MAG])
@@ -196,6 +189,18 @@ class Estimator:
             self._correct(self._heading, self._q_of_filters(), filtered[MAG])
         elif self._beside is not None and self._beside.due():
             self._correct(self._beside, self._bank.q_inertial_from_sensor(), filtered[MAG])
+
+    def _follow(self, changes: Changes, was_valid: Mask) -> None:
+        """Nodes came, went or settle: what is not there idles, and what came starts anew."""
+        if changes.went.any():
+            self._heading.lose(changes.went & was_valid, self._q_of_filters())
+            if self._beside is not None:
+                self._beside.lose(changes.went & was_valid, self._bank.q_inertial_from_sensor())
+        if not self._liveness.alive.all():
+            self._idle(~self._liveness.alive)
+        if changes.came.any():
+            self._lowpass.restart(changes.came)
+            self._bank.restart(changes.came)
 
     @property
     def _beside(self) -> OnlineHeadings | None:
