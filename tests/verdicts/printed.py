@@ -9,7 +9,8 @@ from pathlib import Path
 
 from common.errors import TandemError
 from deploy.experiments.bench.targets import BENCH
-from deploy.experiments.contact.flights import LOADS, Flight, Flights
+from deploy.experiments.contact.flight import Flight
+from deploy.experiments.contact.flights import LOADS, Flights
 from deploy.experiments.contact.hours import judge_flights
 from deploy.experiments.contact.view import judge
 from deploy.experiments.demo.targets import BY_PROFILE

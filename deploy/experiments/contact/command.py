@@ -44,6 +44,11 @@ def contact(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Random seed of the robots' masses and noise.")] = 1,
+    jobs: Annotated[int, typer.Option(help="With --hours: processes; 0: one a core.", min=0, max=64)] = 1,
+    resume: Annotated[
+        Path | None,
+        typer.Option(help="With --hours: keep what is done in this file, and go on from it.", dir_okay=False),
+    ] = None,
     as_json: AsJson = False,
     report: ReportFile = None,
 ) -> None:
@@ -52,16 +57,19 @@ def contact(
     The patient has 4 kg and 10 kN/m, is free to move or clamped against a wall, and is met at 0.25, 0.5 and
     1 m/s. With `--hours`, the robot follows motions through the air instead, and each stop is a false one.
 
-    For false stops: `tandem contact --hours 1 --person people.npz --json`
+    For false stops: `tandem contact --hours 1 --person people.npz --resume hour.json --json`
 
     Example: `tandem contact --drive-bits 16`
     """
     from deploy.experiments.contact.hours import follow_for
+    from deploy.harness.workers import jobs_here
     from deploy.measure.verdict import failed, verdict_table
 
     console = Console(stderr=as_json)
     tables, tree, verdicts = (
-        follow_for(hours, person, seed, console) if hours else _meet_all(reflex, drive_bits, console)
+        follow_for(hours, person, seed, console, jobs or jobs_here(), resume)
+        if hours
+        else _meet_all(reflex, drive_bits, console)
     )
     for table in tables:
         console.print(table)

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
+from deploy.experiments.contact.flight import Flight
+from deploy.experiments.contact.progress import FlightProgress
+from deploy.harness.workers import OnProgress, run_each
 from deploy.sim.patient.free_run import FreeFlight, FreeRun, RecordedPeople, of_motion
 from deploy.sim.patient.operator import TICK_NS, Moves
 from deploy.sim.patient.replay import Lap, held, replay
@@ -33,31 +36,6 @@ READINGS: Mapping[str, Imperfect] = {
 NOTHING, DECLARED = "nothing", "0.5 kg, declared"
 LOADS = (NOTHING, DECLARED)
 """In the right hand."""
-
-
-@dataclass(frozen=True, slots=True)
-class Flight:
-    """One motion, again and again, by one kind of readings and one load."""
-
-    motion: str
-    readings: str
-    load: str
-    laps: tuple[Lap, ...]
-
-    @property
-    def seconds(self) -> float:
-        """Together."""
-        return sum(lap.seconds for lap in self.laps)
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        """The words of each that would have been a stop."""
-        return tuple(words for lap in self.laps for words in lap.findings)
-
-    @property
-    def worst(self) -> Lap:
-        """The one that came nearest to a threshold."""
-        return max(self.laps, key=lambda lap: lap.nearest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,30 +68,70 @@ def shares_s(motions: Mapping[str, Moves], seconds: float) -> dict[str, float]:
     return {name: whole.get(name, rest_s) for name in motions}
 
 
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """One flight to come: its way, tick by tick, for so many ticks."""
+
+    motion: str
+    readings: str
+    load: str
+    way: Array
+    ticks: int
+    seeds: tuple[int, int]
+    """The first lap's, and by how much each further one's is more."""
+
+
 def fly(
-    motions: Mapping[str, Moves], seconds: float, seed: int, flown: Callable[[float], None] = lambda s: None
+    motions: Mapping[str, Moves],
+    seconds: float,
+    seed: int,
+    flown: Callable[[float], None] = lambda s: None,
+    jobs: int = 1,
+    progress: FlightProgress | None = None,
 ) -> Flights:
     """Follow all motions by each kind of readings, `seconds` together, with each load; see `shares_s`.
 
-    Every lap is a robot with other masses and other noise. `flown` gets the seconds of each lap.
+    Every lap is a robot with other masses and other noise. `flown` gets the seconds of each flight. `jobs`
+    processes replay ways; what `progress` has already is not flown again.
     """
+    done = progress or FlightProgress({})
     shares = shares_s(motions, seconds / len(READINGS))
+    every = list(itertools.product(LOADS, READINGS, motions))
+    left = [key for key in every if key not in done.flights]
+    for key in every:
+        if key not in left:
+            flown(done.flights[key].seconds)
     ways: dict[str, Array] = {}
-    by_pipeline = {}
     for name, moves in motions.items():
+        if name in done.by_pipeline and all(motion != name for _, _, motion in left):
+            continue
         flight = FreeFlight(moves, Imperfect(mass_share=MASS_SHARE, seed=seed), ContactConfig())
         flight.follow(min(shares[name], LONGEST_S))
-        ways[name], by_pipeline[name] = flight.setpoints_rad, flight.found
-    seeds = itertools.count(seed)
-    flights = []
-    for load, readings, name in itertools.product(LOADS, READINGS, motions):
-        laps: list[Lap] = []
-        while (done_s := sum(lap.seconds for lap in laps)) < shares[name]:
-            ticks = max(1, round((shares[name] - done_s) * 1e9 / TICK_NS))
-            laps.append(_lap(ways[name][:ticks], readings, load, next(seeds)))
-            flown(laps[-1].seconds)
-        flights.append(Flight(name, readings, load, tuple(laps)))
-    return Flights(by_pipeline, tuple(flights))
+        ways[name] = flight.setpoints_rad
+        done.followed(name, flight.found)
+    tasks = [
+        _Task(
+            name, readings, load, ways[name], max(1, round(shares[name] * 1e9 / TICK_NS)),
+            (seed + every.index((load, readings, name)), len(every)),
+        )
+        for load, readings, name in left
+    ]  # fmt: skip
+    for _, made in run_each(_flight, tasks, jobs):
+        done.flew(made)
+        flown(made.seconds)
+    return Flights(
+        {name: done.by_pipeline[name] for name in motions}, tuple(done.flights[key] for key in every)
+    )
+
+
+def _flight(task: _Task, tell: OnProgress) -> Flight:
+    laps: list[Lap] = []
+    left, (seed, step) = task.ticks, task.seeds
+    while left > 0:
+        way = task.way[:left]
+        laps.append(_lap(way, task.readings, task.load, seed))
+        left, seed = left - len(way), seed + step
+    return Flight(task.motion, task.readings, task.load, tuple(laps))
 
 
 def _lap(way: Array, readings: str, load: str, seed: int) -> Lap:

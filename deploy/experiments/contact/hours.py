@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,22 +10,33 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from deploy.experiments.contact.flights import LOADS, Flight, Flights, fly, motions_of
+from deploy.experiments.contact.flight import Flight
+from deploy.experiments.contact.flights import LOADS, Flights, fly, motions_of
+from deploy.experiments.contact.progress import FlightProgress
 from deploy.measure.verdict import Verdict, at_most
 from deploy.report.tables import number, plain_table
 
 
 def follow_for(
-    hours: float, person: Path | None, seed: int, console: Console
+    hours: float,
+    person: Path | None,
+    seed: int,
+    console: Console,
+    jobs: int = 1,
+    resume: Path | None = None,
 ) -> tuple[list[Table], dict[str, object], list[Verdict]]:
     """Follow all motions for so long with each load: tables, JSON tree, verdicts.
 
-    Raises RecordingError where the person's file cannot be read.
+    `resume`: the file of what is done. Raises RecordingError where the person's file cannot be read, and
+    ConfigError where that file is of another run.
     """
     motions, seconds = motions_of(person), 3600.0 * hours
+    whose = None if person is None else hashlib.sha256(person.read_bytes()).hexdigest()[:16]
+    done = FlightProgress({"hours": hours, "seed": seed, "person": whose}, resume)
+    done.resume()
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("through the air", total=seconds * len(LOADS))
-        found = fly(motions, seconds, seed, lambda flown_s: progress.advance(task, flown_s))
+        found = fly(motions, seconds, seed, lambda flown_s: progress.advance(task, flown_s), jobs, done)
     return [flights_table(found.flights), pipeline_table(found)], flights_tree(found), judge_flights(found)
 
 

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from common.errors import ConfigError
 from common.quaternion import Array
 from deploy.experiments.contact import hours
+from deploy.experiments.contact.flight import Flight
 from deploy.experiments.contact.flights import (
     LOADS,
     MASS_SHARE,
@@ -19,12 +21,12 @@ from deploy.experiments.contact.flights import (
     NOTHING,
     PAYLOAD_KG,
     READINGS,
-    Flight,
     Flights,
     fly,
     motions_of,
     shares_s,
 )
+from deploy.experiments.contact.progress import FlightProgress
 from deploy.measure.verdict import Outcome
 from deploy.sim.patient.free_run import FreeFlight, FreeRun
 from deploy.sim.patient.replay import Lap, held, replay
@@ -48,6 +50,41 @@ def test_a_short_way_has_no_false_stop(short: Flights) -> None:
         assert one.findings == (), one
         assert 0.02 < one.worst.nearest < 1.0
     assert all(verdict.outcome is Outcome.PASSED for verdict in hours.judge_flights(short))
+
+
+def refuses(t_s: float) -> tuple[Array, Array]:
+    raise AssertionError("nobody asked for this motion")
+
+
+def test_a_run_that_was_stopped_goes_on_and_comes_to_the_same(short: Flights, tmp_path: Path) -> None:
+    file, crossed = tmp_path / "hour.json", {"crossed": motions_of(None)["crossed"]}
+    run: dict[str, object] = {"seed": 3}
+
+    def stop(seconds: float) -> None:
+        told.append(seconds)
+        if len(told) == 4:
+            raise KeyboardInterrupt
+
+    told: list[float] = []
+    with pytest.raises(KeyboardInterrupt):
+        fly(crossed, 9.0, 3, stop, progress=FlightProgress(run, file))
+    again = FlightProgress(run, file)
+    again.resume()
+    assert len(again.flights) == 4
+    assert fly(crossed, 9.0, 3, progress=again) == short
+    # what is whole is not flown again: this motion could not be
+    whole = FlightProgress(run, file)
+    whole.resume()
+    assert fly({"crossed": refuses}, 9.0, 3, progress=whole) == short
+    with pytest.raises(ConfigError, match="seed"):
+        FlightProgress({"seed": 4}, file).resume()
+    file.write_text("{}")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        whole.resume()
+
+
+def test_two_processes_come_to_the_same(short: Flights) -> None:
+    assert fly({"crossed": motions_of(None)["crossed"]}, 9.0, 3, jobs=2) == short
 
 
 def red(lap: Lap = LAP, whole: FreeRun = WHOLE, load: str = NOTHING) -> list[str]:
