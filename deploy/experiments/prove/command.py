@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from common.errors import TandemError
+from common.process.runtime import run as run_until_stopped
 from deploy.experiments.prove.table import proof_table
 from deploy.measure.proof import ProofRow, prove
 from deploy.recorded.files import entries_of, head_of
 from deploy.recorded.recorded_config import recorded_config
 from deploy.report.options import AsJson
+from deploy.report.output import in_a_folder
 from master.suit.protocol import SuitProtocol
+
+if TYPE_CHECKING:
+    from deploy.experiments.prove.guide import ProofStep, ProofView
 
 DEFAULT_NODE = 100
 STEP_MS = 5
@@ -50,7 +56,16 @@ def prove_motion(
         str | None,
         typer.Option("--simulate", help="Instead of a recording: simulate over this network profile."),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="How long the simulated robot follows.", min=14.0)] = 24.0,
+    lead: Annotated[
+        Path | None,
+        typer.Option(help="Instead of a recording: be led through one, at the master's `[tap] socket`."),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="With --lead: the recording to write.", dir_okay=False, callback=in_a_folder)
+    ] = Path("proof.mcap"),
+    seconds: Annotated[
+        float, typer.Option(help="How long the hand moves, with --lead or --simulate.", min=14.0)
+    ] = 28.0,
     plant: Annotated[
         list[str] | None,
         typer.Option(help="With --simulate: plant a delay, such as `servo=20`; also encoder, camera (ms)."),
@@ -60,8 +75,11 @@ def prove_motion(
     """Measure hand to hand by a node on the robot's hand, beside what tandem's stamps claim.
 
     The node belongs to no part that it judges. The operator stands and moves that hand irregularly for half
-    a minute, trunk still; `tandem record --tap` records it. Each figure is printed with its bound; a stamp
-    that the hand refutes ends with status 1.
+    a minute, trunk still. --lead says what to tape where and which motion for how long, counts down, shows
+    progress and records it. Each figure is printed with its bound; a stamp that the hand refutes ends with
+    status 1.
+
+    Led: `tandem prove --lead /run/tandem/operator.sock --out proof.mcap`
 
     Without hardware: `tandem prove --simulate 4g --plant encoder=20`
 
@@ -72,16 +90,47 @@ def prove_motion(
         from deploy.experiments.prove.simulated import judge, simulate
 
         rows = judge(simulate(simulate_over, seconds, _planted(plant or ())))
+    elif lead is not None:
+        rows = _led(lead, out, hand, node, seconds)
     elif files:
         rows = _of_recording(files, hand, node, node_recording)
     else:
-        raise TandemError(f"expected a recording, or --simulate lan. {_LEAD}")
+        raise TandemError(f"expected a recording, --lead SOCKET, or --simulate lan. {_LEAD}")
     if as_json:
         typer.echo(json.dumps([asdict(row) for row in rows], indent=2))
     else:
         Console().print(proof_table(rows))
     if any(row.wrong for row in rows):
         raise typer.Exit(1)
+
+
+def _led(tap: Path, out: Path, hand: str, node: int, seconds: float) -> list[ProofRow]:
+    from deploy.experiments.prove.lead import lead
+
+    if out.exists():
+        raise TandemError(f"{out}: exists already; name another file by --out")
+    console = Console(stderr=True)
+    finished: list[bool] = []
+
+    async def work(stop: asyncio.Event) -> None:
+        with console.status("waiting for the master") as status:
+            steps: list[ProofStep] = []
+
+            def show(view: ProofView) -> None:
+                status.update(view.line)
+                if view.step not in steps[-1:]:
+                    steps.append(view.step)
+                    console.print(view.line, highlight=False)
+
+            finished.append(await lead(tap, out, hand, node, seconds, stop, show))
+
+    run_until_stopped(work)
+    console.print(f"recorded into {out}", highlight=False, soft_wrap=True)
+    if finished != [True]:
+        raise TandemError(
+            f"interrupted before the hand had moved enough; `tandem prove {out}` judges what is in it"
+        )
+    return _of_recording([out], hand, node, None)
 
 
 def _planted(words: Sequence[str]) -> dict[str, int]:

@@ -6,6 +6,8 @@ it hangs on a bus at the robot, and a recording made there holds its frames by t
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from collections import deque
 from collections.abc import Iterable
 
 import numpy as np
@@ -22,11 +24,14 @@ from deploy.measure.delay import AngularSpeed, speed_of
 from deploy.measure.proof import Claims, Motions
 from deploy.recorded.recompute import Recorded
 from master.journal.calls import FRAME, FRAMES, TICK, decode_calls
+from master.suit.number import number_of
 from master.suit.protocol import SuitProtocol
 from slave.model.body import BodyModel
 
 FOLLOWS = "track"
 _GYRO = slice(3, 6)
+SYNCS = 8
+"""An answer to an older SYNC is none: nobody knows what it is of."""
 
 
 class NodeRates:
@@ -42,26 +47,47 @@ class NodeRates:
         self._part = part.base_id + node, part, protocol.classic.scale[_GYRO], slice(0, 3)
         self._at_ns: list[int] = []
         self._rate_rad_s: list[Array] = []
-        self._sync_ns: int | None = None
+        self._syncs: deque[tuple[int, int]] = deque(maxlen=SYNCS)
+        """Number and time of the newest SYNCs."""
 
     def take(self, payload: bytes) -> None:
         """One message of the suit's frames. Raises RecordingError."""
         for call in decode_calls(payload):
             match call:
-                case (int(kind), int(), int(now_ns)) if kind == TICK:
-                    self._sync_ns = now_ns
+                case (int(kind), int(tick), int(now_ns)) if kind == TICK:
+                    self._syncs.append((number_of(tick), now_ns))
                 case (int(kind), str(bus), int(frame_id), bytes(data), int()) if kind == FRAME:
-                    if self._sync_ns is not None and (not self._bus or bus == self._bus):
-                        self._frame(self._sync_ns, frame_id, data)
+                    if not self._bus or bus == self._bus:
+                        self._frame(frame_id, data)
 
-    def _frame(self, sync_ns: int, frame_id: int, data: bytes) -> None:
+    def _frame(self, frame_id: int, data: bytes) -> None:
         for wanted, part, scale, gyro in (self._whole, self._part):
-            if frame_id != wanted or len(data) != part.length or sync_ns in self._at_ns[-1:]:
+            if frame_id != wanted or len(data) != part.length:
                 continue
             read = part.decode(data)
-            if read.folded[0] == part.crc.blank(frame_id):  # its checksum is right
+            if read.folded[0] != part.crc.blank(frame_id):
+                continue  # its checksum is wrong
+            sync_ns = self._asked_ns(int(read.tick[0]), part.tick.mask)
+            if sync_ns is not None and sync_ns > self._newest_ns:
                 self._at_ns.append(sync_ns)
                 self._rate_rad_s.append(read.raw[0, gyro] * scale)
+
+    def _asked_ns(self, number: int, mask: int) -> int | None:
+        """When the SYNC went out that an answer names: a busy node's answer may come after the next one."""
+        return next((at_ns for sent, at_ns in reversed(self._syncs) if sent & mask == number), None)
+
+    @property
+    def _newest_ns(self) -> int:
+        return self._at_ns[-1] if self._at_ns else -1
+
+    def answers_since(self, since_ns: int) -> int:
+        """How many SYNCs it answered since then."""
+        return len(self._at_ns) - bisect_left(self._at_ns, since_ns)
+
+    def speed_since(self, since_ns: int) -> Array:
+        """(T,) rad/s: how fast it turned at each SYNC since then."""
+        rates = self._rate_rad_s[bisect_left(self._at_ns, since_ns) :]
+        return np.linalg.norm(rates, axis=1) if rates else np.zeros(0)
 
     def speed(self) -> AngularSpeed:
         """How fast it turned. A gyroscope's bias is the mean of a motion that comes back."""

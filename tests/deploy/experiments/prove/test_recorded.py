@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import msgpack
@@ -18,6 +19,7 @@ from deploy.experiments.prove.recorded import NodeRates, RecordedRun
 from deploy.measure.proof import ENCODER, HAND_TO_HAND, SERVO, ProofRow, prove
 from deploy.recorded.recompute import Recorded
 from master.journal.calls import FRAME, FRAMES, TICK, VERSION
+from master.suit.number import number_of
 from master.suit.protocol import SuitProtocol
 from tests.published import slave_metrics
 
@@ -57,7 +59,7 @@ def frames(fd: bool, by_robots_clock: bool = False, nodes: tuple[int, ...] = (WO
             raw = np.rint(counts).astype(np.int16)
             calls += [
                 (FRAME, "suit", one.id, bytes(one.data), now_ns + NS_PER_MS)
-                for one in PROTOCOL.encode_sample(node, raw, tick, 0, fd)
+                for one in PROTOCOL.encode_sample(node, raw, number_of(tick), 0, fd)
             ]
         entries.append(Recorded(FRAMES, msgpack.packb((VERSION, calls))))
     return entries
@@ -108,7 +110,9 @@ def test_a_node_on_a_bus_at_the_robot_gives_the_same() -> None:
 def test_an_encoder_that_is_20_ms_older_than_its_stamp_is_named() -> None:
     found = rows(frames(True) + states(encoder_late_s=0.02))
     assert found[ENCODER].wrong
-    assert found[ENCODER].why == "the encoders tell a motion 20.0 ms after the hand makes it"
+    said = re.fullmatch(r"the encoders tell a motion (\S+) ms after the hand makes it", found[ENCODER].why)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(20.0, abs=0.2)
     assert found[SERVO].found_ms == pytest.approx(1e3 * SERVO_S, abs=1.0)
 
 
@@ -126,9 +130,24 @@ def test_a_frame_with_a_wrong_checksum_is_left_out() -> None:
     broken = bytes([*bytes(whole.data)[:-1], bytes(whole.data)[-1] ^ 1])
     node = NodeRates(PROTOCOL, WORN)
     for now_ns, data in ((1, bytes(whole.data)), (2, broken)):
-        call = [(TICK, now_ns, now_ns), (FRAME, "suit", whole.id, data, now_ns)]
+        call = [(TICK, 0, now_ns), (FRAME, "suit", whole.id, data, now_ns)]
         node.take(msgpack.packb((VERSION, call)))
     assert list(node.speed().at_ns) == [1]
+
+
+def test_an_answer_that_comes_after_the_next_sync_counts_from_its_own() -> None:
+    """A busy node answers late: by the newest SYNC its reading would be a tick too young."""
+    node = NodeRates(PROTOCOL, WORN)
+    answers = {n: PROTOCOL.encode_sample(WORN, np.full(9, n, np.int16), n, 0, True)[0] for n in (1, 2, 3)}
+    calls: list[tuple[object, ...]] = []
+    for number in (1, 2, 3, 4):
+        calls.append((TICK, number, 10 * number))
+        late = answers.get(number - 1)
+        if late is not None:
+            calls.append((FRAME, "suit", late.id, bytes(late.data), 10 * number + 1))
+    node.take(msgpack.packb((VERSION, calls)))
+    assert list(node.speed().at_ns) == [10, 20, 30]
+    assert node.answers_since(20) == 2
 
 
 def test_a_state_that_cannot_be_read_is_counted() -> None:
