@@ -240,6 +240,25 @@ def serve(
 
 
 @app.command()
+def paths(
+    profiles: Networks = "wifi,4g",
+    seconds: Seconds = 10.0,
+    seed: Seed = 1,
+    report: ReportFolder = Path("trial-paths"),
+) -> None:
+    """Compare one path with two (`[link.twin]`): while the first is whole, loses packets, and is cut.
+
+    On a virtual clock, with no hosts and no rights; the first network is the first path. Writes `paths.json`.
+
+    Example: `tandem trial paths --profiles wifi,4g`
+    """
+    from deploy.experiments.trial.cell.choice import choose
+    from deploy.experiments.trial.paths.view import run_paths_trial
+
+    run_paths_trial(choose("--profiles", profiles), seconds, seed, report, Console())
+
+
+@app.command()
 def verify(
     folder: Annotated[Path, typer.Argument(help="Report folder of a trial.", exists=True, file_okay=False)],
     tasks: Tasks = None,

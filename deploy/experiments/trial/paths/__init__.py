@@ -1,0 +1,1 @@
+"""`tandem trial paths`: one path against two, on a virtual clock."""
