@@ -12,7 +12,6 @@ from enum import StrEnum
 
 from common.clock import to_s
 from common.wire.messages import Action
-from deploy.experiments.demo.options import DemoOptions
 from deploy.measure import motion
 from deploy.sim.network.profile import Profile, Way
 from deploy.sim.world.twin_link import DEAD, TwinLink
@@ -59,7 +58,7 @@ def rows(first: Profile, second: Profile, seconds: float, seed: int) -> Iterator
 
 def run(fault: PathFault, first: Profile, second: Profile | None, seconds: float, seed: int) -> PathRow:
     """One run; `second` None: over the first path alone. Raises TandemError if the robot never follows."""
-    world = VirtualWorld(WorldSettings(network_seed=seed, overrides=DemoOptions().overrides()))
+    world = VirtualWorld(WorldSettings(network_seed=seed))
     link = TwinLink(first, second, seed, world._at)
     world.link = link
     world.engage()
