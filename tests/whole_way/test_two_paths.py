@@ -17,6 +17,7 @@ WIFI, CELLULAR = load_profile("wifi"), load_profile("4g")
 SECONDS = 6.0
 
 
+@pytest.mark.timeout(400)
 def test_a_cut_holds_the_robot_over_one_path_and_not_over_two() -> None:
     alone, beside = (run(PathFault.CUT, WIFI, second, SECONDS, seed=1) for second in (None, CELLULAR))
     assert (alone.paths, beside.paths) == (1, 2)

@@ -100,7 +100,8 @@ class ProofGuide:
         return ProofView(self.step, self._todo(now_ns), self._share(now_ns))
 
     def _go_on(self, now_ns: int) -> None:
-        if self._taped.answers_since(now_ns - HEARD_NS) < LEAST_ANSWERS:
+        # by the SYNCs' own time: a host that is behind with reading must not look like a silent node
+        if self._taped.answers_since(self._taped.asked_ns - HEARD_NS) < LEAST_ANSWERS:
             self._to(ProofStep.TAPE)
         elif not self._follows(now_ns):
             self._to(ProofStep.FOLLOW)

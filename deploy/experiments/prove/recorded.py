@@ -80,6 +80,11 @@ class NodeRates:
     def _newest_ns(self) -> int:
         return self._at_ns[-1] if self._at_ns else -1
 
+    @property
+    def asked_ns(self) -> int:
+        """When the newest SYNC went out; 0 before the first."""
+        return self._syncs[-1][1] if self._syncs else 0
+
     def answers_since(self, since_ns: int) -> int:
         """How many SYNCs it answered since then."""
         return len(self._at_ns) - bisect_left(self._at_ns, since_ns)
