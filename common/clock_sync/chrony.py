@@ -22,6 +22,8 @@ _LOCAL = 0x7F7F0101
 """The reference of a daemon that follows nobody: its own clock (`local`)."""
 _UNSYNCHRONISED = 3
 _DEEPEST = 16
+_MOST_S, _MOST_PPM = 16.0, 100_000.0
+"""Beyond these no statement is believed: NTP's largest dispersion (RFC 5905), a tenth of the clock's rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,23 @@ class Tracking:
             return "chronyd is not synchronised"
         if self.reference == _LOCAL:
             return "chronyd follows no source but its own clock"
+        if implausible := self._implausible():
+            return f"chronyd states {implausible}: not believed"
         return ""
+
+    def _implausible(self) -> str:
+        """The first figure that no clock of use has, in words; empty where there is none."""
+        bounds = (
+            ("a root delay", self.root_delay_s, 0.0, _MOST_S, "s"),
+            ("a root dispersion", self.root_dispersion_s, 0.0, _MOST_S, "s"),
+            ("a newest offset", self.last_offset_s, -_MOST_S, _MOST_S, "s"),
+            ("a correction", self.correction_s, -_MOST_S, _MOST_S, "s"),
+            ("a skew", self.skew_ppm, 0.0, _MOST_PPM, "ppm"),
+        )
+        for name, value, least, most, unit in bounds:
+            if not least <= value <= most:
+                return f"{name} of {value:g} {unit}, expected {least:g} to {most:g}"
+        return "" if self.error_ns > 0 else "an error of nothing"
 
 
 def tracking_request(number: int) -> bytes:

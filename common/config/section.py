@@ -36,6 +36,8 @@ def one_of(name: str, known: Iterable[str]) -> str:
 
 
 def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
+    if "\0" in str(path):
+        raise ValueError("expected a path without the character NUL: no file has such a name")
     folder: Path = (info.context or {}).get("folder", Path())
     return folder / path
 

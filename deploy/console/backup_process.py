@@ -8,10 +8,14 @@ up. It loads the link only then, so that waiting costs little memory.
 from __future__ import annotations
 
 import json
+import os
 import sys
+from contextlib import suppress
 from typing import TextIO
 
 WITHIN_S = 60.0
+READY = b"ready\n"
+"""What it says first: it was found, loaded and begun."""
 
 
 def stops_left(lines: TextIO) -> tuple[dict[str, object], list[str]]:
@@ -56,7 +60,9 @@ def ask_on(where: dict[str, object], robots: list[str], within_s: float = WITHIN
 
 
 def main() -> None:
-    """Wait for the console's end."""
+    """Say that this process runs, and wait for the console's end."""
+    with suppress(OSError):  # the console has died already
+        os.write(sys.stdout.fileno(), READY)
     where, robots = stops_left(sys.stdin)
     if robots:
         ask_on(where, robots)

@@ -117,6 +117,7 @@ async def _run(options: ConsoleOptions, door: _Door) -> None:
                 if options.tap is not None:
                     tasks.create_task(hearing.read_tap(options.tap))
                     tasks.create_task(hearing.stand_in(where.link))
+                tasks.create_task(backup.watch())
                 await _serve(options, door, session, hearing, stoppers, relay, opened)
         finally:
             for stopper in stoppers.values():

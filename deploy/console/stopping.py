@@ -83,6 +83,9 @@ class RobotStopper:
             return
         if here:
             self._here[presence.instance] = presence
+            if self.under_way:
+                # it may have come too late for the question that is on its way
+                self._count.expect(presence)
         else:
             self._here.pop(presence.instance, None)
 

@@ -233,8 +233,9 @@ class CameraFeed:
             if why == LOST:
                 self._rate.lost_on_way(now_ns)
             self._wants_alone = True
-        if lost != self._lost_before or self._rate.lost != lost:
-            self._lost_before, self._wants_alone = self._rate.lost, True
+        if lost > self._lost_before or self._rate.lost != lost:
+            self._wants_alone = True
+        self._lost_before = self._rate.lost
         old = self._alone_ns is None or now_ns - self._alone_ns >= self._keyframe_ns
         return self._wants_alone or old
 

@@ -24,6 +24,10 @@ _COMMAND_S = 0.08
 _USED = 0.6
 """A picture that needed less of its budget says nothing about a larger one."""
 _LOST_NS = 1_000_000_000
+_TOLD_NS = 300_000_000
+"""Where no acknowledgement has come yet: after so long a picture that is said to be lost is."""
+_PATIENCE = 1.5
+"""Acknowledgements that may still come, by how long they took lately."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,11 @@ class RateControl:
         self._interval_ns = self._fastest_ns
         self._budget = float(LEAST_BYTES)
         self._under_way: dict[int, _Sent] = {}
+        self._told: dict[int, _Sent] = {}
+        """Pictures that somebody says are lost; the operator's acknowledgement refutes it."""
+        self._told_ns = 0
+        self._takes_ns = 0.0
+        """How long an acknowledgement takes: the longest lately."""
         self._last_sent_ns: int | None = None
         self._rest_until_ns = 0
         self._lowered_ns = -1
@@ -93,8 +102,13 @@ class RateControl:
         `delay_ns`: by how much its transit was longer than an empty packet's on an idle link; None where the
         clocks' offset is not trusted, and then only the number under way is learnt.
         """
-        sent = self._under_way.get(number)
+        sent = self._under_way.get(number) or self._told.get(number)
         self._under_way = {n: s for n, s in self._under_way.items() if n > number}
+        if sent is not None:
+            self._takes_ns = max(0.9 * self._takes_ns, float(now_ns - sent.sent_ns))
+        if number in self._told:
+            self.lost -= len(self._told)
+            self._told.clear()
         if sent is None or delay_ns is None:
             return
         self._rest_until_ns = sent.sent_ns + round(self._limits.cameras * delay_ns / _SHARE)
@@ -107,13 +121,23 @@ class RateControl:
             self._budget = min(self._budget + _MORE_BYTES, float(self._limits.most_bytes))
 
     def lost_on_way(self, now_ns: int) -> None:
-        """The operator's side says that a picture was lost: none that is under way will be acknowledged."""
+        """Somebody who receives the pictures says that one was lost: the next may be sent at once.
+
+        The request does not tell who asks, and a viewer's bad line is none of the operator's. So the rate
+        falls only once the operator has not acknowledged those pictures either.
+        """
         if self._under_way:
             self.lost += len(self._under_way)
+            if not self._told:
+                self._told_ns = now_ns
+            self._told |= self._under_way
             self._under_way.clear()
-            self._lower(now_ns)
 
     def _give_up(self, now_ns: int) -> None:
+        wait_ns = _PATIENCE * self._takes_ns if self._takes_ns else _TOLD_NS
+        if self._told and now_ns - self._told_ns > min(wait_ns, _LOST_NS):
+            self._told.clear()
+            self._lower(now_ns)
         lost = [n for n, s in self._under_way.items() if now_ns - s.sent_ns > _LOST_NS]
         for number in lost:
             del self._under_way[number]

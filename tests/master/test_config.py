@@ -97,3 +97,9 @@ def load_text(text: str) -> MasterConfig:
     from common.config.load import check_config
 
     return check_config(EXAMPLE, tomllib.loads(text), MasterConfig)
+
+
+def test_a_path_that_no_file_can_have_is_named() -> None:
+    (line,) = mistakes(r'nodes.head.calibration="a\u0000b.toml"')
+    assert "nodes.head.calibration" in line
+    assert "NUL" in line

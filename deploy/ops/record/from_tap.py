@@ -86,6 +86,9 @@ class _Marking:
 
     def may_record(self, topic: str) -> bool:
         """Whether the subject has consented to what a topic holds; True without a session."""
+        if "/video/" in topic and self._named is None and self._study is not None:
+            # at each picture: a session without video may have begun since the last look for marks
+            self._look_for_session(self._study)
         if self._doubt:
             return "/video/" not in topic
         return self._session is None or self._session.may_record(topic)

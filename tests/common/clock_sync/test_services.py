@@ -7,6 +7,7 @@ import logging
 import socket
 import struct
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,27 @@ def test_a_daemon_that_follows_nobody_states_nothing(reference: int, leap: int, 
     tracking = read_tracking(answer(1, reference=reference, leap=leap), 1)
     assert tracking is not None
     assert why in tracking.nothing_stated
+
+
+@pytest.mark.parametrize(
+    ("figure", "value", "why"),
+    [
+        ("correction_s", 17.0, "a correction of 17 s, expected -16 to 16"),
+        ("last_offset_s", -17.0, "a newest offset of -17 s"),
+        ("skew_ppm", -1.0, "a skew of -1 ppm"),
+        ("root_delay_s", -0.002, "a root delay of -0.002 s, expected 0 to 16"),
+        ("root_dispersion_s", -0.001, "a root dispersion of -0.001 s"),
+        ("root_dispersion_s", 20.0, "a root dispersion of 20 s"),
+    ],
+)
+def test_figures_that_no_clock_has_are_not_believed(figure: str, value: float, why: str) -> None:
+    tracking = read_tracking(answer(1), 1)
+    assert tracking is not None
+    stated = replace(tracking, **{figure: value}).nothing_stated
+    assert stated.startswith("chronyd states")
+    assert why in stated
+    perfect = replace(tracking, root_delay_s=0.0, root_dispersion_s=0.0, last_offset_s=0.0)
+    assert "an error of nothing" in perfect.nothing_stated, "a bound of 0 would beat every true one"
 
 
 @given(st.binary(max_size=200))

@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from common.clock import monotonic_ns
-from common.link import LinkSession, open_session
+from common.link import LinkSession, open_session, presence
 from common.link.config import LinkConfig
 from common.link.roster import Roster
 from common.wire.summary import RobotSummary, encode_summary
@@ -75,5 +75,28 @@ def test_a_publisher_learns_whether_somebody_looks(routed: bool) -> None:
             await until(lambda: not wanted[-1])
             watching.link("a").subscribe(STATE, lambda *_: None)
             await until(lambda: wanted[-1])
+
+    run(test)
+
+
+def test_a_host_that_shows_tokens_without_end_fills_no_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(presence, "MOST_OF_ALL", 10)
+
+    async def test() -> None:
+        shown: list[tuple[str, bool]] = []
+        door = free_endpoint()
+        async with open_session(LinkConfig(listen=[door])) as watching:
+            watching.watch_presence(lambda one, here: shown.append((one.robot, here)))
+            async with open_session(LinkConfig(connect=[door])) as flooding:
+                for number in range(40):
+                    flooding.link(f"r{number}").declare_alive("slave", 7)
+                await until(lambda: len(shown) >= 10)
+                flooding.link("last").declare_alive("slave", 7)
+                flooding.drop("r0")
+                await until(lambda: ("r0", False) in shown)
+                assert sum(here for _, here in shown) == 10
+                flooding.link("next").declare_alive("slave", 7)
+                await until(lambda: ("next", True) in shown)
+            await until(lambda: sum(here for _, here in shown) == sum(not here for _, here in shown))
 
     run(test)

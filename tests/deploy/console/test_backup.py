@@ -61,14 +61,16 @@ def test_without_a_process_a_stop_is_not_kept() -> None:
 
 def test_one_that_died_is_begun_anew_with_all_that_is_open(tmp_path: Path) -> None:
     kept = tmp_path / "lines"
-    copies = (sys.executable, "-c", f"import sys; open({str(kept)!r}, 'w').write(sys.stdin.read())")
-    backup = StopBackup(LINK, "nurse-1", copies)
+    code = f"import sys; print('ready', flush=True); open({str(kept)!r}, 'w').write(sys.stdin.read())"
+    backup = StopBackup(LINK, "nurse-1", (sys.executable, "-c", code))
     assert backup.start()
+    until_up(backup)
     assert backup.keep("robot-1")
     assert backup._process is not None
     backup._process.kill()
     backup._process.wait()
     assert backup.keep("robot-2")
+    until_up(backup)
     process = backup._process.pid
     backup.close()
     for _ in range(1000):
@@ -78,6 +80,73 @@ def test_one_that_died_is_begun_anew_with_all_that_is_open(tmp_path: Path) -> No
     while _lives(process):
         time.sleep(0.01)
     assert stops_left(io.StringIO(kept.read_text()))[1] == ["robot-1", "robot-2"]
+
+
+def until_up(backup: StopBackup) -> None:
+    """Until it has said that it runs."""
+    for _ in range(1000):
+        assert not backup._never_up(backup._began_ns)
+        if backup._up:
+            return
+        time.sleep(0.01)
+    raise AssertionError("it has not said that it runs")
+
+
+def ended(backup: StopBackup) -> None:
+    assert backup._process is not None
+    backup._process.wait()
+
+
+def test_one_that_ends_before_it_runs_is_no_backup_and_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
+    backup = StopBackup(LINK, "nurse-1", (sys.executable, "-c", "raise SystemExit('no such module')"))
+    assert backup.start(), "nobody can know yet"
+    ended(backup)
+    began_ns = backup._began_ns
+    for second in range(20):
+        backup.look(began_ns + second * 10**9)
+    assert backup._began_ns == began_ns, "not begun again all the time"
+    assert [each.message for each in caplog.records if "it does not start" in each.message] != []
+    assert len(caplog.records) == 1
+    assert not backup.keep("robot-1"), "the page must not say that the stop is kept"
+    ended(backup)
+    backup.close()
+
+
+def test_one_that_never_says_that_it_runs_is_no_backup_after_ten_seconds() -> None:
+    backup = StopBackup(LINK, "nurse-1", (sys.executable, "-c", "import sys; sys.stdin.read()"))
+    assert backup.start()
+    assert backup.keep("robot-1")
+    backup._began_ns -= 10_000_000_001
+    assert not backup.keep("robot-1")
+    backup.done("robot-1")
+    backup.close()
+
+
+def test_one_that_died_later_is_begun_anew_without_a_stop(caplog: pytest.LogCaptureFixture) -> None:
+    code = "import sys; print('ready', flush=True); sys.stdin.read()"
+    backup = StopBackup(LINK, "nurse-1", (sys.executable, "-c", code))
+    assert backup.start()
+    until_up(backup)
+    backup.look(backup._began_ns)
+    assert caplog.records == []
+    assert backup._process is not None
+    before = backup._process
+    before.kill()
+    before.wait()
+    backup.look(backup._began_ns)
+    assert [each.message for each in caplog.records if "it has ended" in each.message] != []
+    assert backup._process is not before
+    until_up(backup)
+    assert backup.keep("robot-1")
+    backup.done("robot-1")
+    backup.close()
+
+
+def test_the_real_process_says_that_it_runs() -> None:
+    backup = StopBackup(LINK, "nurse-1")
+    assert backup.start()
+    until_up(backup)
+    backup.close()
 
 
 def _lives(pid: int) -> bool:

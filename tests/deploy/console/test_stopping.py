@@ -143,3 +143,18 @@ def test_a_robot_that_says_that_it_is_stopped_did_not_fail(monkeypatch: pytest.M
         await one.close()
 
     asyncio.run(story())
+
+
+def test_a_second_robot_that_appears_during_the_stop_is_waited_for() -> None:
+    async def story() -> None:
+        link = Asked(silent=1)
+        one = stopper(link)
+        shown = one.stop("nurse-1")
+        await until(lambda: len(link.questions) == 1)
+        one._on_presence(ProcessPresence(ROBOT, "slave", 9, place="other host"), True)
+        await until(lambda: len(link.questions) > 3)
+        assert shown.robot_ns is None, "only one of the two has acknowledged"
+        assert one.under_way
+        await one.close()
+
+    asyncio.run(story())

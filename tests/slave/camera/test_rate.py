@@ -144,3 +144,42 @@ def test_whatever_the_link_does_the_bounds_hold(kb_s: list[float], hears: bool) 
     gaps = [b - a for a, b in zip(world.sent_ns, world.sent_ns[1:], strict=False)]
     assert min(gaps, default=S) >= 83 * MS
     assert max(gaps, default=0) <= 3 * S
+
+
+def told_lost(after_s: float, acknowledged: int | None = None) -> RateControl:
+    """Four pictures reached the operator 80 ms after they were sent; then somebody says that one was lost."""
+    rate, ms = RateControl(LIMITS), 1_000_000
+    for number in range(1, 5):
+        rate.sent(number, 1500, number * 200 * ms)
+        rate.seen(number, (number * 200 + 80) * ms, 5 * ms)
+    rate.sent(5, 1500, 1000 * ms)
+    rate.sent(6, 1500, 1010 * ms)
+    assert rate.due_ns(1020 * ms) is None, "two are under way"
+    rate.lost_on_way(1020 * ms)
+    assert rate.due_ns(1020 * ms) is not None, "the next may be sent at once"
+    if acknowledged is not None:
+        rate.seen(acknowledged, 1090 * ms, 5 * ms)
+    rate.due_ns(1020 * ms + round(1e9 * after_s))
+    return rate
+
+
+def test_a_viewer_s_loss_does_not_lower_the_operator_s_rate() -> None:
+    for acknowledged in (5, 6):
+        rate = told_lost(1.0, acknowledged)
+        assert (rate.lowered, rate.lost) == (0, 0), "the operator has them"
+
+
+def test_a_loss_of_the_operator_s_lowers_it_once_the_acknowledgement_is_overdue() -> None:
+    assert told_lost(0.119).lowered == 0
+    assert (told_lost(0.13).lowered, told_lost(0.13).lost) == (1, 2)
+    assert told_lost(5.0).lowered == 1
+
+
+def test_before_any_acknowledgement_a_loss_counts_after_a_third_of_a_second() -> None:
+    rate = RateControl(LIMITS)
+    rate.sent(1, 1500, 0)
+    rate.lost_on_way(10_000_000)
+    rate.due_ns(300_000_000)
+    assert rate.lowered == 0
+    rate.due_ns(320_000_000)
+    assert rate.lowered == 1

@@ -264,3 +264,14 @@ def test_while_it_is_not_known_who_is_recorded_no_picture_is(tmp_path: Path) -> 
         marking.take(0)
         assert marking.may_record("tandem/robot-1/video/head") is video
         assert marking.may_record("suit/frames")
+
+
+def test_a_session_without_video_that_has_just_begun_lets_no_picture_pass(tmp_path: Path) -> None:
+    """The marks are looked for twice a second, and each picture is one too many."""
+    study = tmp_path / "study"
+    marking = _Marking(tmp_path, None, study)
+    marking.take(0)
+    assert marking.may_record("tandem/robot-1/video/head"), "no session is under way"
+    say_under_way(begin(study, CUP, "k7pd", scope=("motion",)))
+    assert not marking.may_record("tandem/robot-1/video/head")
+    assert marking.may_record("suit/frames")
