@@ -7,9 +7,15 @@ With T the reference that both services follow, a_l = T − local clock and a_r 
 No symmetry of the way is assumed, so a line that is slow in one direction only is measured as it is. But a
 statement is believed, not proved. The round trip proves limits of θ: a statement that contradicts them is
 wrong, and none is believed for a while. A lie within the round trip's limits cannot be noticed.
+
+Two true estimates may differ by both bounds. Where the choice between them changes, the offset that is told
+goes from one to the other slowly, and its bound is wider by what is left of the way: else latencies, and the
+target of who predicts by them, would jump.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from common.clock import NS_PER_S, to_ms
 from common.clock_sync.estimator import Offset
@@ -19,6 +25,8 @@ from common.wire.messages import ClockReference
 DISTRUST_NS = 60 * NS_PER_S
 """After a contradiction."""
 ROUND_TRIP = "round trip"
+SLEW_PPM = 5000
+"""How fast the told offset goes to the chosen one: 5 ms a second, far below what anybody's motion shows."""
 
 
 class BestOffset:
@@ -36,6 +44,10 @@ class BestOffset:
         self._distrusted_until_ns: int | None = None
         self._refuted = ""
         self._judged: tuple[ClockReference, ClockReference] | None = None
+        self._told: tuple[int, Offset] | None = None
+        """When an offset was told last, and which."""
+        self._lead_ns = 0
+        """What the told offset is above the chosen one."""
 
     def heard(self, remote: ClockReference | None, now_ns: int) -> None:
         """What the other host states, as its newest message has it."""
@@ -46,14 +58,35 @@ class BestOffset:
         stated, why = self._stated(now_ns, round_trip, own)
         half_trip = f"round trip ± {to_ms(round_trip.bound_ns):.3f} ms"
         if stated is None:
-            return self._choose(ROUND_TRIP, f"half the round trip: {why}", round_trip)
+            return self._choose(now_ns, ROUND_TRIP, f"half the round trip: {why}", round_trip)
         beside = f"± {to_ms(stated.bound_ns):.3f} ms stated by {why}"
         if stated.bound_ns < round_trip.bound_ns:
-            return self._choose(why, f"{beside}; {half_trip}", stated)
-        return self._choose(ROUND_TRIP, f"{half_trip}, narrower than {beside}", round_trip)
+            return self._choose(now_ns, why, f"{beside}; {half_trip}", stated)
+        return self._choose(now_ns, ROUND_TRIP, f"{half_trip}, narrower than {beside}", round_trip)
 
-    def _choose(self, source: str, words: str, offset: Offset) -> Offset:
-        self.source, self.words = source, words
+    def _choose(self, now_ns: int, source: str, words: str, chosen: Offset) -> Offset:
+        changed, self.source, self.words = source != self.source, source, words
+        if self._told is None or not chosen.trusted or not self._told[1].trusted:
+            self._lead_ns = 0
+        else:
+            told_ns, told = self._told
+            if changed:
+                self._lead_ns = told.offset_ns - chosen.offset_ns
+                if abs(self._lead_ns) > told.bound_ns + chosen.bound_ns:
+                    self._lead_ns = 0  # one of them was wrong: nobody is to go slowly from there
+            else:
+                way_ns = max(0, now_ns - told_ns) * SLEW_PPM // 1_000_000
+                left_ns = max(0, abs(self._lead_ns) - way_ns)
+                self._lead_ns = left_ns if self._lead_ns > 0 else -left_ns
+        offset = chosen
+        if self._lead_ns:
+            self.words = f"{to_ms(abs(self._lead_ns)):.1f} ms away, going there: {words}"
+            offset = replace(
+                chosen,
+                offset_ns=chosen.offset_ns + self._lead_ns,
+                bound_ns=chosen.bound_ns + abs(self._lead_ns),
+            )
+        self._told = now_ns, offset
         return offset
 
     def _stated(

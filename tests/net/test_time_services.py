@@ -76,11 +76,12 @@ def follower(address: str, options: str = "", port: int = GPS_PORT) -> list[str]
 
 
 async def offset(rig: Rig, until: str) -> OffsetMetrics:
-    """What the slave says of the clocks, once its words have this in them."""
+    """What the slave says of the clocks, once its words have this in them and it has gone all the way."""
 
     def there() -> bool:
         slave = rig.observer.slave
-        return slave is not None and slave.offset.trusted and until in slave.offset.words
+        words = "" if slave is None or not slave.offset.trusted else slave.offset.words
+        return until in words and "going there" not in words
 
     await rig.until(there, SETTLE_S, f"clocks: {until}", rig.check)
     assert rig.observer.slave is not None

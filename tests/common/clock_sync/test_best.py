@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -214,3 +215,32 @@ def test_a_service_that_falls_silent_or_is_another_starts_anew() -> None:
     assert (other.source, other.rate_error_ppb) == ("ptp", OSCILLATOR_PPB)
     track.silent()
     assert track.reference(20 * NS_PER_S) is None
+
+
+def test_where_the_source_changes_the_offset_goes_slowly_and_its_bound_holds_all_the_way() -> None:
+    """90 ms there, 10 ms back: the midpoint is 40 ms off when the statements begin, and when they end."""
+    best, truth_ns = BestOffset(), AHEAD_NS
+    midpoint = Offset(AHEAD_NS + 40 * NS_PER_MS, 50 * NS_PER_MS, trusted=True)
+    told: list[Offset] = []
+    for tick in range(5000):
+        now_ns = tick * 5 * NS_PER_MS
+        stating = 500 <= tick < 3000
+        own, remote = both(now_ns)
+        best.heard(remote if stating else None, now_ns)
+        told.append(best.estimate(now_ns, midpoint, own))
+    steps_ns = [abs(after.offset_ns - before.offset_ns) for before, after in pairwise(told)]
+    assert max(steps_ns) <= 25_100, "5 ms a second, and what the statements' own rate allows"
+    assert all(abs(each.offset_ns - truth_ns) <= each.bound_ns for each in told)
+    assert told[2900].bound_ns < NS_PER_MS, "it has arrived"
+    assert told[-1] == midpoint
+
+
+def test_after_a_lie_it_goes_back_at_once() -> None:
+    best = BestOffset()
+    own, remote = both(0, lie_ns=40 * NS_PER_MS)
+    best.heard(remote, 0)
+    assert best.estimate(0, TRIP, own).bound_ns < NS_PER_MS
+    own, remote = both(NS_PER_S, lie_ns=500 * NS_PER_MS)
+    best.heard(remote, NS_PER_S)
+    closer = Offset(AHEAD_NS, 5 * NS_PER_MS, trusted=True)
+    assert best.estimate(NS_PER_S, closer, own) == closer, "what was told was no true bound"
