@@ -9,6 +9,7 @@ import struct
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -101,7 +102,8 @@ def test_a_daemon_that_follows_nobody_states_nothing(reference: int, leap: int, 
 def test_figures_that_no_clock_has_are_not_believed(figure: str, value: float, why: str) -> None:
     tracking = read_tracking(answer(1), 1)
     assert tracking is not None
-    stated = replace(tracking, **{figure: value}).nothing_stated
+    changed: dict[str, Any] = {figure: value}
+    stated = replace(tracking, **changed).nothing_stated
     assert stated.startswith("chronyd states")
     assert why in stated
     perfect = replace(tracking, root_delay_s=0.0, root_dispersion_s=0.0, last_offset_s=0.0)
