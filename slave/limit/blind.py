@@ -129,7 +129,7 @@ class BlindDistance:
         goal_rad_s = np.where(goal != aim[0], 0.0, aim[1])
         error = goal - position - goal_rad_s * step_s
         wish = np.where(
-            course.held, 0.0, goal_rad_s + approach(error, course.max_acceleration_rad_s2, step_s)
+            course.held, 0.0, goal_rad_s + approach(error, goal_rad_s, course.max_acceleration_rad_s2, step_s)
         )
         wish = self.slowed(position, wish, step_s)
         most, gain = course.max_velocity_rad_s, self._limits.max_acceleration_rad_s2 * step_s

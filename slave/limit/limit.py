@@ -58,17 +58,22 @@ def safe_speed(distance_rad: Array, acceleration_rad_s2: Array, dt_s: float) -> 
     return out
 
 
-def approach(error_rad: Array, acceleration_rad_s2: Array, dt_s: float) -> Array:
+def approach(error_rad: Array, goal_rad_s: Array, acceleration_rad_s2: Array, dt_s: float) -> Array:
     """Speed (J,), relative to a moving target, that closes an error and brakes in time.
 
-    In units of a dt² the error is d; the speed in units of a dt is  min(d, max(½, √(1 + 2d) - 1)).
+    In units of a dt² the error is d; in units of a dt the target moves away at g ≥ 0, and the speed is
+    min(d, max(½, √((1 + g)² + 2d) - 1 - g)).
     d closes the error in this very step: a target that keeps the limits is followed without lag, since
     half a step's acceleration is how far its mean velocity over a step differs from that at its end.
-    The root is `safe_speed`: a far target is reached without overshoot, also where steps come late.
+    The root is `safe_speed` for a target that may brake as well: the joint, v + w fast, still stops where the
+    target does, should that brake with all that the joint has: (v + w)² = v² + 2 a e. So a joint left behind
+    by its limits does not pass the place where the target turns, also where steps come late.
     """
     step = acceleration_rad_s2 * dt_s
     distance = np.abs(error_rad) / (step * dt_s)
-    speed = np.minimum(distance, np.maximum(0.5, np.sqrt(1.0 + 2.0 * distance) - 1.0))
+    # a target that comes towards the joint needs no room
+    away = 1.0 + np.maximum(np.where(error_rad < 0.0, -goal_rad_s, goal_rad_s), 0.0) / step
+    speed = np.minimum(distance, np.maximum(0.5, np.sqrt(away * away + 2.0 * distance) - away))
     out: Array = np.copysign(speed * step, error_rad)
     return out
 
@@ -202,7 +207,7 @@ class SetpointLimiter:
         # a target beyond the limit is one that stands at the limit
         goal_rad_s = np.where(beyond, 0.0, target_rad_s)
         error = goal - self.position_rad - goal_rad_s * dt_s
-        wish = np.where(held, 0.0, goal_rad_s + approach(error, max_acceleration_rad_s2, dt_s))
+        wish = np.where(held, 0.0, goal_rad_s + approach(error, goal_rad_s, max_acceleration_rad_s2, dt_s))
         wish = self.slowed(self.position_rad, wish, dt_s)
         motion = LimiterStep(
             self.position_rad, self.velocity_rad_s, dt_s, self.limits,

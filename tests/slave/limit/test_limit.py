@@ -152,6 +152,26 @@ def test_a_moving_target_is_caught_up_with_and_followed_exactly() -> None:
     assert np.allclose(watched.limiter.position_rad, MID + 0.2 + rate * i * DT, rtol=0, atol=EPS)
 
 
+@pytest.mark.parametrize("speed", [0.5, 0.8, 1.0])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_joint_left_behind_stops_where_its_target_stops(speed: float, sign: float) -> None:
+    """The target is 0.15 rad ahead and as fast as the joint may be, then brakes as hard as the joint can."""
+    watched = Watched(MID)
+    goal, rate, beyond = MID + sign * 0.15, sign * speed * LIMITS.max_velocity_rad_s, np.zeros(JOINTS)
+    goals = [MID]
+    for i in range(250):
+        if i > 20:
+            brake = LIMITS.max_acceleration_rad_s2 * DT
+            rate = np.sign(rate) * np.maximum(np.abs(rate) - brake, 0.0)
+        goal = LIMITS.reachable(goal + rate * DT)
+        goals.append(goal)
+        watched.step(goal, rate)
+        farthest = np.max(sign * np.array(goals), axis=0)
+        beyond = np.maximum(beyond, sign * watched.limiter.position_rad - farthest)
+    # what half a step's acceleration takes to stop, twice: the target itself brakes in steps
+    assert (beyond <= LIMITS.max_acceleration_rad_s2 * DT**2).all()
+
+
 def test_a_jump_is_answered_by_acceleration_cruise_and_braking() -> None:
     watched = Watched(LIMITS.lower_rad)
     speeds = []

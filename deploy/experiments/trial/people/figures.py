@@ -31,17 +31,20 @@ class PeopleFigures:
     overshoot_deg: float
     """99 % are below it."""
     largest_overshoot_deg: float
+    unlimited_rmse_deg: float
+    """If the robot's joints had no limits of speed and acceleration."""
     still_deg: float
     """RMS of the robot's motion about its mean while the operator stands still."""
 
 
 def figures(clips: Iterable[Followed], shoulders: tuple[tuple[int, int, int], ...]) -> PeopleFigures:
     """Judge some clips together; `shoulders` are the columns of pitch, roll and yaw of each."""
-    errors, robots, operators, beyond, still = [], [], [], [], []
+    errors, unlimited, robots, operators, beyond, still = [], [], [], [], [], []
     for one in clips:
         moving, judged = slice(0, one.still), _judged(one, shoulders)
         truth, robot = one.truth_rad[moving], one.robot_rad[moving]
         errors.append((robot - truth)[judged])
+        unlimited.append((one.unlimited_rad[moving] - truth)[judged])
         beyond.append(_beyond(truth, robot)[judged])
         robots.append(_acceleration(robot)[judged[1:-1]])
         operators.append(_acceleration(truth)[judged[1:-1]])
@@ -53,6 +56,7 @@ def figures(clips: Iterable[Followed], shoulders: tuple[tuple[int, int, int], ..
         roughness=_rms(robots) / _rms(operators),
         overshoot_deg=float(np.percentile(over, 99.0)),
         largest_overshoot_deg=float(over.max()),
+        unlimited_rmse_deg=float(np.degrees(_rms(unlimited))),
         still_deg=float(np.degrees(_rms(still))),
     )
 

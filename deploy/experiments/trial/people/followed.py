@@ -19,6 +19,7 @@ from deploy.sim.suit.people import ClipSpline
 from slave.guard.limits import MotionLimits
 from slave.limit.limit import SetpointLimiter
 from slave.track.config import TrackConfig, make_tracker
+from slave.track.tracker import Tracker
 
 TICK_S = 0.005
 _SERVO_RAD_S, _DAMPING = 2.0 * math.pi * 8.0, math.sqrt(0.5)
@@ -26,6 +27,8 @@ SERVO_LAG_S = 2.0 * _DAMPING / _SERVO_RAD_S + 0.5 * TICK_S
 POSITION_NOISE_DEG, VELOCITY_NOISE_DEG_S = 0.03, 0.2
 """Of the suit's angles beside a slow error, which no strategy can know of."""
 _FIRST_S = 0.0023
+FOREKNOWN = "foreknown"
+"""No strategy: the targets are what the operator will really do. What is left is the joints' limits."""
 STILL_S = 3.0
 """After a clip the operator stands still for so long."""
 
@@ -50,6 +53,8 @@ class Followed:
     robot_rad: Array
     still: int
     """From this row on the operator stands still."""
+    unlimited_rad: Array
+    """Where the robot would be if its joints had no limits of speed and acceleration."""
 
 
 def follow(
@@ -59,28 +64,65 @@ def follow(
     lasts_s = course.lasts_s * slower
     time_s = np.arange(0.0, lasts_s + STILL_S, TICK_S)
     truth = course(np.minimum(time_s, lasts_s) / slower)
-    tracker = make_tracker(TrackConfig(strategy=strategy, servo_lag_s=SERVO_LAG_S))
-    limits = _limits(skeleton)
-    limiter = SetpointLimiter(skeleton.joint_names, limits)
-    limiter.seat(truth[0])
-    free = np.zeros(truth.shape[1], np.bool_)
-    step, servo = _servo_step(), np.stack([truth[0], np.zeros(truth.shape[1])])
-    robot = np.empty_like(truth)
-    samples = _samples(course, slower, line, time_s[-1], seed)
+    if strategy == FOREKNOWN:
+        targets = _foreknown(course, slower, time_s)
+    else:
+        tracker = make_tracker(TrackConfig(strategy=strategy, servo_lag_s=SERVO_LAG_S))
+        targets = _tracked(tracker, truth[0], time_s, _samples(course, slower, line, time_s[-1], seed))
+    robot, unlimited = _moved(_limited(targets, skeleton)), _moved(targets[0])
+    return Followed(truth, robot, int(np.searchsorted(time_s, lasts_s)), unlimited)
+
+
+def _foreknown(course: ClipSpline, slower: float, time_s: Array) -> Array:
+    """(2, T, J) position and velocity of the operator by the time that the servos are there."""
+    lasts_s = course.lasts_s * slower
+    then_s = time_s + SERVO_LAG_S
+    own_s = np.minimum(then_s, lasts_s) / slower
+    return np.stack([course(own_s), course(own_s, 1) / slower * (then_s < lasts_s)[:, None]])
+
+
+def _tracked(
+    tracker: Tracker, start_rad: Array, time_s: Array, samples: Iterator[tuple[float, float, Array, Array]]
+) -> Array:
+    """(2, T, J) position and velocity of the tracker's targets."""
+    targets = np.empty((2, len(time_s), len(start_rad)))
     arrival = next(samples, None)
     for k, now_s in enumerate(time_s.tolist()):
         while arrival is not None and arrival[0] <= now_s:
             tracker.accept(to_ns(arrival[1]), to_ns(arrival[0]), arrival[2], arrival[3])
             arrival = next(samples, None)
         target = tracker.target(to_ns(now_s))
-        if target is not None:
-            limiter.step(
-                to_ns(now_s), TICK_S, target.position_rad, target.velocity_rad_s, free,
-                limits.max_velocity_rad_s, limits.max_acceleration_rad_s2,
-            )  # fmt: skip
-        robot[k] = servo[0]
-        servo = step @ np.vstack([servo, limiter.position_rad])
-    return Followed(truth, robot, int(np.searchsorted(time_s, lasts_s)))
+        if target is None:
+            targets[0, k], targets[1, k] = start_rad, 0.0
+        else:
+            targets[0, k], targets[1, k] = target.position_rad, target.velocity_rad_s
+    return targets
+
+
+def _limited(targets: Array, skeleton: Skeleton) -> Array:
+    """(T, J) what the guard's limiter makes of (2, T, J)."""
+    limits = _limits(skeleton)
+    limiter = SetpointLimiter(skeleton.joint_names, limits)
+    limiter.seat(targets[0, 0])
+    free = np.zeros(targets.shape[2], np.bool_)
+    out: Array = np.empty_like(targets[0])
+    for k, (position, velocity) in enumerate(targets.swapaxes(0, 1)):
+        limiter.step(
+            k, TICK_S, position, velocity, free, limits.max_velocity_rad_s, limits.max_acceleration_rad_s2
+        )
+        out[k] = limiter.position_rad
+    return out
+
+
+def _moved(setpoint_rad: Array) -> Array:
+    """(T, J) what the servos make of setpoints: where they are as each is written."""
+    step = _servo_step()
+    out: Array = np.empty_like(setpoint_rad)
+    servo = np.stack([setpoint_rad[0], np.zeros(setpoint_rad.shape[1])])
+    for k, setpoint in enumerate(setpoint_rad):
+        out[k] = servo[0]
+        servo = step @ np.vstack([servo, setpoint])
+    return out
 
 
 def _samples(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 
 from common.skeleton import Skeleton
 from deploy.experiments.trial.people.figures import PeopleFigures, figures
-from deploy.experiments.trial.people.followed import Followed, Line, follow
+from deploy.experiments.trial.people.followed import FOREKNOWN, Followed, Line, follow
 from deploy.measure.verdict import Verdict, at_most
 from deploy.sim.suit.people import Clip, spline
 
@@ -33,11 +34,14 @@ class Row:
     found: PeopleFigures
     over_latest: float
     """RMSE over that of `latest` over the same line at 12.5 Hz, without loss and jitter."""
+    unlimited_over_latest: float
+    """The same, had the joints no limits of speed and acceleration: what prediction alone gives."""
 
     def tree(self) -> dict[str, object]:
         """As JSON."""
         return {
             "slower": self.slower, "strategy": self.strategy, "rmse_over_latest": self.over_latest,
+            "unlimited_over_latest": self.unlimited_over_latest,
             **asdict(self.line), **asdict(self.found),
         }  # fmt: skip
 
@@ -56,24 +60,30 @@ def rows(
     slower: Sequence[float] = SLOWER,
     seed: int = 1,
 ) -> Iterator[Row]:
-    """Each strategy at each rate over each line; `latest` at 12.5 Hz comes first, then a poor line."""
+    """Each strategy at each rate over each line; a poor line; what limits leave of full knowledge."""
     for slow in slower:
+        one = _Lines(clips, skeleton, slow, seed)
         for ms in ONE_WAY_MS:
-            one = _Lines(clips, skeleton, slow, seed)
             plain = Line(ms / 1e3)
             below = one.figures("latest", plain)
             for strategy in strategies:
                 for rate_hz in RATES_HZ:
                     line = Line(ms / 1e3, rate_hz)
                     found = below if (strategy, line) == ("latest", plain) else one.figures(strategy, line)
-                    yield Row(slow, line, strategy, found, found.rmse_deg / below.rmse_deg)
+                    yield _row(slow, line, strategy, found, below)
             if ms == ROUGH_LINE_MS and "predict" in strategies:
                 poor = Line(ms / 1e3, JUDGED_HZ, ROUGH_JITTER_S, ROUGH_LOSS)
                 found = one.figures("predict", poor)
-                yield Row(slow, poor, "predict", found, found.rmse_deg / below.rmse_deg)
+                yield _row(slow, poor, "predict", found, below)
+            yield _row(slow, plain, FOREKNOWN, one.foreknown, below)
 
 
-@dataclass(frozen=True, slots=True)
+def _row(slower: float, line: Line, strategy: str, found: PeopleFigures, latest: PeopleFigures) -> Row:
+    unlimited = found.unlimited_rmse_deg / latest.unlimited_rmse_deg
+    return Row(slower, line, strategy, found, found.rmse_deg / latest.rmse_deg, unlimited)
+
+
+@dataclass(frozen=True)
 class _Lines:
     clips: Sequence[Clip]
     skeleton: Skeleton
@@ -83,6 +93,11 @@ class _Lines:
     def figures(self, strategy: str, line: Line) -> PeopleFigures:
         """Of all clips."""
         return figures(self._followed(strategy, line), shoulders(self.skeleton))
+
+    @cached_property
+    def foreknown(self) -> PeopleFigures:
+        """Of a robot that is told what the operator will do: alike over every line."""
+        return self.figures(FOREKNOWN, Line(0.0))
 
     def _followed(self, strategy: str, line: Line) -> Iterator[Followed]:
         for n, clip in enumerate(self.clips):

@@ -30,7 +30,7 @@ def run_people_trial(
     )
     speeds = SLOWER if slower is None else (slower,)
     table = plain_table(
-        "line", "Hz", "strategy", "/ latest", "RMSE °", "rough", "over °", "most °", "still °"
+        "line", "Hz", "strategy", "/ latest", "no limits", "RMSE °", "rough", "over °", "most °", "still °"
     )
     done: list[Row] = []
     for row in rows(clips, skeleton, strategies, speeds, seed):
@@ -39,7 +39,8 @@ def run_people_trial(
         poor = f", {100 * line.loss:g} % lost, jitter" if line.loss else ""
         table.add_row(
             f"1 / {row.slower:g}, {1e3 * line.one_way_s:.0f} ms{poor}", f"{line.rate_hz:g}", row.strategy,
-            f"{row.over_latest:.2f}", f"{f.rmse_deg:.2f}", f"{f.roughness:.2f}", f"{f.overshoot_deg:.1f}",
+            f"{row.over_latest:.2f}", f"{row.unlimited_over_latest:.2f}",
+            f"{f.rmse_deg:.2f}", f"{f.roughness:.2f}", f"{f.overshoot_deg:.1f}",
             f"{f.largest_overshoot_deg:.0f}", f"{f.still_deg:.2f}",
         )  # fmt: skip
     console.print(table)

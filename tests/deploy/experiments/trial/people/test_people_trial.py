@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,17 @@ def test_predict_is_nearer_than_latest_and_nearer_at_25_hz(done: list[Row]) -> N
         assert fast.found.overshoot_deg < 6.0
 
 
+def test_what_the_joints_limits_leave_is_told_apart_from_the_prediction(done: list[Row]) -> None:
+    floors = [row for row in done if row.strategy == "foreknown"]
+    assert [row.line.one_way_s for row in floors] == [0.025, 0.08]
+    for floor in floors:
+        mine = only(done, "predict", round(1e3 * floor.line.one_way_s), 25.0)
+        assert floor.found.unlimited_rmse_deg < 0.2
+        assert floor.unlimited_over_latest < floor.over_latest < mine.over_latest
+        assert mine.unlimited_over_latest < mine.over_latest
+    assert floors[0].found == floors[1].found
+
+
 def test_while_the_operator_stands_the_robot_stands(done: list[Row]) -> None:
     assert all(row.found.still_deg < 0.15 for row in done)
 
@@ -78,7 +90,7 @@ def test_verdicts_name_what_is_missed_and_what_nobody_did(done: list[Row]) -> No
 def test_a_figure_beyond_its_limit_fails(done: list[Row]) -> None:
     row = only(done, "predict", 25, 25.0)
     for ratio, outcome in ((0.34, Outcome.PASSED), (0.341, Outcome.FAILED)):
-        changed = Row(row.slower, row.line, row.strategy, row.found, ratio)
+        changed = replace(row, over_latest=ratio)
         (one,) = (v for v in verdicts([changed], None) if v.name.endswith("RMSE / latest") and "ms" in v.name)
         assert one.outcome is outcome
 
@@ -86,7 +98,7 @@ def test_a_figure_beyond_its_limit_fails(done: list[Row]) -> None:
 def test_a_perfect_robot_has_no_error_no_overshoot_and_a_roughness_of_one(file: Path) -> None:
     course = spline(load_clips(PeopleConfig(file=file), SKELETON)[0].position_rad, 100.0)
     one = follow(course, 1.0, SKELETON, "latest", Line(0.025), seed=1)
-    perfect = figures([Followed(one.truth_rad, one.truth_rad, one.still)], SHOULDERS)
+    perfect = figures([Followed(one.truth_rad, one.truth_rad, one.still, one.truth_rad)], SHOULDERS)
     assert perfect.rmse_deg == 0.0
     assert perfect.overshoot_deg == 0.0
     assert perfect.still_deg < 1e-9
@@ -109,7 +121,7 @@ def test_the_command_prints_and_writes_it(
     assert result.exit_code == 0, result.output
     assert "made1, made2 (held out)" in result.output
     tree = json.loads((tmp_path / "report" / "people.json").read_text())
-    assert {row["strategy"] for row in tree["rows"]} == {"latest", "predict"}
+    assert {row["strategy"] for row in tree["rows"]} == {"latest", "predict", "foreknown"}
     assert any(target["outcome"] == "not judged" for target in tree["targets"])
 
 
