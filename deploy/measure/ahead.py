@@ -32,7 +32,8 @@ LEAST_TUBE_RAD = float(np.radians(0.1))
 FIRST_TUBE_RAD = float(np.radians(5.0))
 """Before enough has come true."""
 SHARE = 0.95
-_GRID_NS = 10 * NS_PER_MS
+_GRID_NS = 20 * NS_PER_MS
+"""As states come. At half of it the console worked a seventh more and foretold no better."""
 _TICK_NS = 5 * NS_PER_MS
 """A setpoint is read back at the next tick."""
 _KEPT = 500
@@ -150,12 +151,13 @@ class RobotAhead:
             return
         begin_ns = self._targets.last_ns or now_ns - _GRID_NS
         for at_ns in range(max(begin_ns + _GRID_NS, now_ns - _LONGEST_NS), now_ns + 1, _GRID_NS):
-            while self._sent and self._sent[0].stamps.put_ns + way_ns <= at_ns:
+            while self._sent and (came_ns := self._sent[0].stamps.put_ns + way_ns) <= at_ns:
                 command = self._sent.popleft()
                 still = self._state.setpoint_rad
                 position = np.where(command.valid, command.position_rad, still)
                 velocity = np.where(command.valid, command.velocity_rad_s, 0.0)
-                self._tracker.accept(command.stamps.sampled_ns, at_ns, position, velocity)
+                came_ns = max(came_ns, at_ns - _GRID_NS)
+                self._tracker.accept(command.stamps.sampled_ns, came_ns, position, velocity)
             target = self._tracker.target(at_ns)
             if target is not None:
                 self._targets.add(at_ns, target.position_rad)
