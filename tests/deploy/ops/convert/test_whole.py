@@ -212,6 +212,7 @@ def test_the_video_has_a_frame_for_each_row_at_a_constant_rate(dataset: Path) ->
 
 
 def test_lerobot_itself_opens_it(dataset: Path) -> None:
+    # not among tandem's extras: with torch and its CUDA libraries it is more than 1.6 GB
     lerobot = pytest.importorskip("lerobot.datasets.lerobot_dataset")
     found = lerobot.LeRobotDataset("tandem/care", root=dataset)
     assert found.num_episodes == 2
