@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 
-SECONDS = "28"
+SECONDS = "40"
+"""Ten segments: a busy host leaves gaps in some, which then do not count."""
 MOST_S = 150.0
 LATE_MS = 40
 
@@ -87,6 +88,7 @@ def test_the_hand_of_a_real_slave_confirms_its_stamps(on_this_host: OnThisHost, 
         assert status == 0, said
         for words in ("begin in 5", "move your right hand irregularly", "step 5 of 5"):
             assert words in said.lower()
+        assert not rows[ENCODER]["why"]
         assert rows[ENCODER]["bound_ms"] < 15.0
         assert rows[ENCODER]["found_ms"] == pytest.approx(0.0, abs=5.0)
         assert not rows[ENCODER]["wrong"]
