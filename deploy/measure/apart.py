@@ -6,7 +6,7 @@ whole course at once: so each is a check of the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from common.skeleton import Skeleton
 from common.skeleton.kinematics import orientations, origins
 from common.skeleton.links import hinge_values, place_links
 from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone
-from slave.model.capsules import capsules
+from slave.model.capsules import capsules, links
 from slave.model.pairs import moving, pairs
 
 _HALVINGS = 25
@@ -40,6 +40,22 @@ class Distances:
         """(T,) the least distance between two parts of the robot, or one and its stand; inf without pairs."""
         parts = [self._own_m(rows) for rows in _blocks(position_rad)]
         return np.concatenate(parts) if parts else np.empty(0)
+
+    def between_m(self, position_rad: Array, one: Set[str], other: Set[str]) -> Array:
+        """(T,) the least distance between bodies of these names; inf where no such pair is kept apart."""
+        names = [link.name for link in links(self._skeleton)]
+        first, second = (
+            np.isin(self._segment, [i for i, n in enumerate(names) if n in some]) for some in (one, other)
+        )
+        a, b = self._pairs.T
+        chosen = (first[a] & second[b]) | (first[b] & second[a])
+        a, b = a[chosen], b[chosen]
+        if not len(a):
+            return np.full(len(position_rad), np.inf)
+        ends = [self._placed(rows) for rows in _blocks(position_rad)]
+        return np.concatenate(
+            [(_between(e[:, a], e[:, b]) - self._radius[a] - self._radius[b]).min(axis=1) for e in ends]
+        )
 
     def _own_m(self, position_rad: Array) -> Array:
         ends, radius = self._placed(position_rad), self._radius

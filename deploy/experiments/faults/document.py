@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from deploy.harness.faults.fault import FaultRow
 from deploy.harness.faults.judge import FaultOutcome
@@ -23,12 +23,15 @@ FIGURES_HEAD = (
 _NONE = "–"
 
 
-def matrix(outcomes: Sequence[FaultOutcome]) -> str:
-    """Both tables, between the marks."""
+def matrix(outcomes: Sequence[FaultOutcome], lacking: Mapping[str, str] | None = None) -> str:
+    """Both tables, between the marks. `lacking`: rows that do not apply to the robot, with what it lacks."""
+    unapplied = [
+        (f"**{name}**", f"does not apply: {why}", _NONE, _NONE) for name, why in (lacking or {}).items()
+    ]
     missed = [f"- **{o.fault.name}**: {o.fault.missed}" for o in outcomes if o.fault.missed]
     parts = [
         BEGIN,
-        table(WORDS_HEAD, (words(outcome.fault) for outcome in outcomes)),
+        table(WORDS_HEAD, [*(words(outcome.fault) for outcome in outcomes), *unapplied]),
         "## Measured",
         "At the 12-bit encoders of the simulated robot, on a clock that is simulated too, so that everybody "
         "gets the same; where a program is killed, the encoders of simulated CANopen drives in real time. "

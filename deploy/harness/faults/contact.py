@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from common.clock import to_s
 from deploy.harness.faults.fault import ENGAGE
 from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.setting import Setting
+from deploy.harness.faults.touched import Part, body_of, hand, wrist
 from deploy.harness.faults.virtual import VirtualFault, holds
 from deploy.sim.patient.patient import in_the_way
 from deploy.sim.patient.robot import TouchingRobot
@@ -17,6 +20,7 @@ NOTICED_S = 0.08
 BACK_S = 1.0
 """Braked, and gone back until nothing pushes and some centimetres more."""
 UNDECLARED_KG = 4.0
+LOADED = "A bag of {kg:g} kg, not declared in the robot's file, is hung over a forearm."
 PERSON = "Free the person, and see to him. Then engage; the robot goes slowly to the operator's posture."
 
 
@@ -26,9 +30,10 @@ def _robot(scene: Scene) -> TouchingRobot:
     return robot
 
 
-def _meets(scene: Scene, *, clamped: bool) -> None:
+def _meets(scene: Scene, part: Part | None, *, clamped: bool) -> None:
     robot = _robot(scene)
-    robot.segment = "right_hand"
+    assert part is not None
+    robot.segment, robot.local_m = part.body, np.array(part.at_m)
     patient = robot.patient = in_the_way(*robot.point(), clamped=clamped)
 
     def watch() -> None:
@@ -38,16 +43,23 @@ def _meets(scene: Scene, *, clamped: bool) -> None:
     scene.each_period = watch
 
 
+def _slow(scene: Scene) -> None:
+    _meets(scene, hand(scene.skeleton), clamped=False)
+
+
 def _free(scene: Scene) -> None:
-    _meets(scene, clamped=False)
+    _meets(scene, wrist(scene.skeleton), clamped=False)
 
 
 def _clamped(scene: Scene) -> None:
-    _meets(scene, clamped=True)
+    _meets(scene, wrist(scene.skeleton), clamped=True)
 
 
-def _takes_up(scene: Scene) -> None:
-    _robot(scene).load("right_forearm", UNDECLARED_KG)
+def takes_up(scene: Scene, kg: float = UNDECLARED_KG) -> None:
+    """The forearm carries so much more."""
+    body = body_of(scene.skeleton, "right_forearm")
+    assert body is not None
+    _robot(scene).load(body, kg)
 
 
 CONTACT: tuple[VirtualFault, ...] = (
@@ -56,7 +68,7 @@ CONTACT: tuple[VirtualFault, ...] = (
         done="The robot moves slowly to the operator's posture; its hand meets a person who gives way.",
         robot="A protective stop; the hand goes back the way it came until it is free, and 3 cm more.",
         person=PERSON,
-        act=_free, begins=State.ALIGN, setting=WITH_PATIENT,
+        act=_slow, begins=State.ALIGN, setting=WITH_PATIENT,
         reacts_s=0.3, stands_s=0.3 + BACK_S, yields=True, held_by={"contact"},
     ),
     holds(
@@ -77,11 +89,11 @@ CONTACT: tuple[VirtualFault, ...] = (
     ),
     holds(
         name="payload wrong",
-        done=f"A bag of {UNDECLARED_KG:g} kg, not declared in the robot's file, is hung over a forearm.",
+        done=LOADED.format(kg=UNDECLARED_KG),
         robot="Takes the weight for somebody who pulls: a protective stop, and engage is refused until the "
         "load is gone or declared.",
         person=f"Take it off, or declare it in [servos.payload]. {ENGAGE}",
-        act=_takes_up, setting=WITH_PATIENT,
+        act=takes_up, setting=WITH_PATIENT,
         reacts_s=0.3, stands_s=2.0, yields=True, held_by={"contact"},
     ),
 )  # fmt: skip

@@ -14,7 +14,7 @@ from common.errors import ConfigError
 from common.quaternion import Array
 from common.wire.codec import decode, encode
 from common.wire.messages import Command
-from deploy.examples.profiles import NURSING, example
+from deploy.examples.profiles import example
 from deploy.harness.faults.fault import BRAKED_S, ENGAGE, NOTICED_S
 from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.setting import Setting
@@ -28,6 +28,7 @@ SLACK_M = 0.002
 CAME_NEAR_M = 0.015
 CUT_S = 0.6
 """Well into the reach."""
+AFTER_CUT_S = 0.08 + NOTICED_S
 ARMS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow_pitch")
 CROSSED = (45.0, -10.0, -75.0, 90.0)
 ON_THE_HEAD = (135.0, 0.0, -50.0, 122.0)
@@ -48,11 +49,17 @@ def _posture(scene: Scene, degrees: Sequence[float]) -> Array:
 
 
 def _goes_to(degrees: Sequence[float], cut_s: float = math.inf) -> Callable[[Scene], None]:
-    """From now on the operator goes to a posture of both arms; after `cut_s` nothing comes any more."""
+    return goes_to(lambda scene: _posture(scene, degrees), cut_s)
+
+
+def goes_to(
+    posture: Callable[[Scene], Array], cut_s: float = math.inf, reach_s: float = REACH_S
+) -> Callable[[Scene], None]:
+    """From now on the operator goes to joint angles (J,); after `cut_s` nothing comes any more."""
 
     def act(scene: Scene) -> None:
         begin, begin_ns = scene.newest().position_rad, scene.run.now_ns
-        end = _posture(scene, degrees)
+        end = posture(scene)
 
         def carry(way: Traffic, payload: bytes) -> Sequence[Delivery]:
             since_s = (scene.run.now_ns - begin_ns) / NS_PER_S
@@ -60,8 +67,8 @@ def _goes_to(degrees: Sequence[float], cut_s: float = math.inf) -> Callable[[Sce
                 return ()
             if way is Traffic.COMMAND:
                 command = decode(payload, Command, len(begin))
-                share = min(since_s / REACH_S, 1.0)
-                rate = (end - begin) / REACH_S if share < 1.0 else np.zeros_like(begin)
+                share = min(since_s / reach_s, 1.0)
+                rate = (end - begin) / reach_s if share < 1.0 else np.zeros_like(begin)
                 position = begin + share * (end - begin)
                 payload = encode(replace(command, position_rad=position, velocity_rad_s=rate))
             return ((0, payload),)
@@ -86,10 +93,10 @@ def came_near(scene: Scene) -> list[str]:
     return wrong
 
 
-def _wrong_file(scene: Scene) -> None:
-    """What `tandem slave` and the doctor do with such a file."""
+def wrong_file(scene: Scene, zone: str = ON_THE_ROBOT) -> None:
+    """What `tandem slave` and the doctor do with a file with such a zone."""
     try:
-        load_config(example("slave", NURSING), SlaveConfig, [f"guard.zones=[{ON_THE_ROBOT}]"])
+        load_config(example("slave", scene.profile), SlaveConfig, [f"guard.zones=[{zone}]"])
     except ConfigError as error:
         if "zones.0" in str(error) and "in the zero pose" in str(error):
             return
@@ -120,7 +127,7 @@ DISTANCE = (
         done="The operator reaches for the bed, and on the way the link is cut.",
         robot="Brakes and stands, before the margin: there was always room to brake.",
         person=ENGAGE, act=_goes_to(AHEAD, CUT_S), setting=BESIDE_A_BED, also=came_near,
-        reacts_s=CUT_S + 0.08 + NOTICED_S, stands_s=CUT_S + 0.08 + NOTICED_S + BRAKED_S,
+        reacts_s=CUT_S + AFTER_CUT_S, stands_s=CUT_S + AFTER_CUT_S + BRAKED_S,
         held_by={"command", "lease"},
     ),
     goes_on(
@@ -129,7 +136,7 @@ DISTANCE = (
         robot="The new program refuses the file, and names the zone and the part that stands in it; "
         "a robot that runs goes on with the zones that it has.",
         person="Correct the zone's coordinates: metres in the robot's base frame.",
-        act=_wrong_file,
+        act=wrong_file,
         strays_deg=0.0,
     ),
 )  # fmt: skip

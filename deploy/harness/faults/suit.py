@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+
+import numpy as np
 
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING
@@ -11,12 +14,15 @@ from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.setting import Setting
 from deploy.harness.faults.virtual import goes_on, holds, holds_joints
 from deploy.sim.suit.faults import FaultsConfig, Loss, Twin
+from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, Move
 from deploy.sim.suit.motion import OperatorMotion, parse_motion
+from deploy.sim.suit.postures import robot_posture
 from deploy.sim.suit.wrong_readings import WrongReading, WrongReadingKind
 from slave.guard import State
 
 NODE = "right_forearm"
 """A node of the reaching arm."""
+LEAN_DEG = 25.0
 LIARS: tuple[tuple[str, str, WrongReadingKind, int | None], ...] = (
     ("sensor node frozen", "A node of the reaching arm repeats one reading.", "frozen", None),
     ("sensor node reads zero", "The node answers with zeros, as after a reset.", "zero", None),
@@ -56,6 +62,17 @@ def _leaning() -> OperatorMotion:
     )
     text = f"period_s = 60.0\n[rest_deg]\nwaist_pitch = 25\n{moves}"
     return parse_motion(text, load_skeleton(NURSING), source="leaning")
+
+
+def leaning_of(profile: str) -> OperatorMotion:
+    """An operator of another robot: bowed by 25°, or with the arms as far out where the trunk cannot bow."""
+    skeleton = load_skeleton(profile)
+    place, left_rad = robot_posture(skeleton, {"waist_pitch": LEAN_DEG})
+    if left_rad.max() > math.radians(1.0):
+        place, _ = robot_posture(skeleton, {"shoulder_roll": LEAN_DEG})
+    rest = np.clip(place, skeleton.lower_rad, skeleton.upper_rad)
+    later = Move(skeleton.joint_names[0], 30.0, 1.0, float(rest[0]))
+    return MinimumJerkMotion(skeleton.joint_names, rest, [later], period_s=60.0)
 
 
 def _leans(scene: Scene) -> None:

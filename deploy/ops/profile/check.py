@@ -13,6 +13,8 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from deploy.report.tables import plain_table
 from deploy.sim.suit.postures import POSTURES, robot_posture
+from slave.contact.config import ContactConfig
+from slave.contact.watch import ContactWatch
 from slave.guard.config import GuardConfig
 from slave.model.distance import DistanceModel
 
@@ -32,6 +34,8 @@ class JointCourse:
     nearest_m: float
     """Between two parts of the robot that the joint brings together; infinite where there are none."""
     between: str
+    noticed_nm: float
+    """Torque from outside at rest from which it counts as pushed, by output encoders; inf: not watched."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,8 @@ class Checked:
     taken: Sequence[TakenPosture]
     touching: Sequence[str]
     """Parts that are nearer than the guard's margin in the zero pose."""
+    dull: str
+    """Below which force no push is noticed, in words."""
 
 
 def checked(skeleton: Skeleton) -> Checked:
@@ -66,9 +72,12 @@ def checked(skeleton: Skeleton) -> Checked:
         for p, d in zip(near.pair.tolist(), near.distance_m.tolist(), strict=True)
         if d < margin_m
     ]
-    courses = [_course(skeleton, distances, zero, j) for j in range(len(skeleton.joints))]
+    watch = ContactWatch(skeleton, ContactConfig())
+    courses = [
+        _course(skeleton, distances, zero, j, float(watch.floor_nm[j])) for j in range(len(skeleton.joints))
+    ]
     taken = [worn(skeleton, name, posture) for name, posture in POSTURES.items()]
-    return Checked(skeleton, courses, taken, list(dict.fromkeys(touching)))
+    return Checked(skeleton, courses, taken, list(dict.fromkeys(touching)), watch.dull)
 
 
 def worn(skeleton: Skeleton, name: str, posture_deg: Mapping[str, float]) -> TakenPosture:
@@ -78,7 +87,9 @@ def worn(skeleton: Skeleton, name: str, posture_deg: Mapping[str, float]) -> Tak
     return TakenPosture(name, position, left)
 
 
-def _course(skeleton: Skeleton, distances: DistanceModel, zero: Array, j: int) -> JointCourse:
+def _course(
+    skeleton: Skeleton, distances: DistanceModel, zero: Array, j: int, noticed_nm: float
+) -> JointCourse:
     joint = skeleton.joints[j]
     nearest, between = math.inf, ""
     for angle in np.linspace(joint.lower_rad, joint.upper_rad, _STEPS):
@@ -90,16 +101,17 @@ def _course(skeleton: Skeleton, distances: DistanceModel, zero: Array, j: int) -
             nearest, between = float(near.distance_m[k]), " – ".join(distances.names[near.pair[k]])
     limits = (math.degrees(joint.lower_rad), math.degrees(joint.upper_rad))
     turns = ", ".join(dict.fromkeys(skeleton.segment_names[skeleton.angle_slots[a][0]] for a in joint.drives))
-    return JointCourse(joint.name, limits, math.degrees(joint.zero_rad), turns, nearest, between)
+    return JointCourse(joint.name, limits, math.degrees(joint.zero_rad), turns, nearest, between, noticed_nm)
 
 
 def range_table(found: Checked) -> Table:
     """A row a joint."""
-    table = plain_table("joint", "from °", "to °", "zero pose °", "turns", "nearest cm")
+    table = plain_table("joint", "from °", "to °", "zero pose °", "turns", "pushed from N m", "nearest cm")
     for one in found.courses:
         near = f"{100.0 * one.nearest_m:.1f} {one.between}" if one.nearest_m < _TOLD_M else ""
         low, high = (f"{angle:.0f}" for angle in one.range_deg)
-        table.add_row(one.name, low, high, f"{one.zero_deg:.0f}", one.turns, near)
+        noticed = f"{one.noticed_nm:.2g}" if math.isfinite(one.noticed_nm) else "not watched"
+        table.add_row(one.name, low, high, f"{one.zero_deg:.0f}", one.turns, noticed, near)
     return table
 
 

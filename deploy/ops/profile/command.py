@@ -78,7 +78,10 @@ def check(
         Path | None, typer.Option(help="Draw the robot in each posture into this PNG file.", dir_okay=False)
     ] = None,
 ) -> None:
-    """Show what a robot makes of the operator's postures, and where its joints bring it.
+    """Show what a robot makes of postures, where its joints bring it, and which push it notices.
+
+    The contact thresholds come from the model: from its masses, its motors, and the steps of its encoders.
+    `[contact.joints.NAME] threshold_nm` in the slave's file replaces one.
 
     Ends with status 1 if a posture within reach is missed, or parts of the robot touch in the zero pose.
 
@@ -94,6 +97,8 @@ def check(
     console.print(range_table(found))
     for line in posture_lines(found):
         console.print(f"[bold]operator[/], {line}")
+    if found.dull:
+        console.print(f"[bold]contact[/], {found.dull}")
     for what in skeleton.unconfirmed:
         console.print(f"[yellow]not confirmed[/]: {what}")
     if picture is not None:

@@ -20,6 +20,8 @@ from deploy.measure import motion
 from deploy.ops.profile.check import checked, worn
 from deploy.ops.profile.compiled import compiled
 from deploy.sim.world.world import VirtualWorld, WorldSettings
+from slave.contact.config import ContactConfig
+from slave.contact.thresholds import angles_of, thresholds_nm
 from slave.model.build import build_model, unit_rates
 from slave.model.capsules import capsules
 from slave.model.pairs import pairs
@@ -110,6 +112,16 @@ def test_the_robot_takes_the_operators_posture(skeleton: Skeleton, posture: str)
             assert side * hand[1] > 0.0
         else:
             assert hand[0] > 0.1
+
+
+def test_the_check_tells_which_push_each_joint_notices(skeleton: Skeleton) -> None:
+    found = checked(skeleton)
+    noticed = {one.name: one.noticed_nm for one in found.courses}
+    model = build_model(skeleton)
+    config = ContactConfig()
+    floors = thresholds_nm(skeleton, model, config, angles_of(config, drives=False)).min(axis=0)
+    assert [noticed[name] for name in skeleton.joint_names] == pytest.approx(floors.tolist())
+    assert "no push is noticed below" in found.dull
 
 
 def test_no_parts_touch_in_the_zero_pose(skeleton: Skeleton) -> None:
