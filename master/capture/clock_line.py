@@ -9,8 +9,11 @@ the node's own step, comes down to an arrival that is earlier at once, and follo
 Δ is the step of the node's own time or count, or, without either, the number of periods since the last
 arrival; b is the length of a step, learnt over some seconds: 100 ppm of drift are then 0.2 ms of error.
 
-A node that counts, and from some time on samples slower or faster (it is throttled, or was set anew), is
-learnt again once two windows of arrivals agree on that: by its count alone its samples would seem ever older.
+A node without a time of its own that from some time on samples slower or faster (it is throttled, or was
+set anew) is learnt again once two windows of arrivals agree on that: by its old step its samples would seem
+ever older. Where it counts, a window's arrivals are divided by its counts. Where it does not, only arrivals
+can tell lost samples: the step is the mean of the gaps that are about as long as most. A node of which every
+second sample is lost cannot be told from one that samples half as often.
 """
 
 from __future__ import annotations
@@ -34,9 +37,19 @@ _BASE_S = 5.0
 _RESET_S = 0.25
 """Own time and arrivals that differ by more: the node has begun anew, or its clock was set."""
 _LARGEST_DRIFT = 0.01
+_COUNTED_DRIFT = 0.06
+"""Of a counting node's step: beyond the least change of its rate that two windows tell. What a stall held
+back is no other number of counts, as it may be of arrivals."""
+_SLIPS = 0.003
+"""A usual gap over `_BASE_S` that differs so much from the step of a node that neither counts nor tells time:
+samples are then taken for lost that were never sent. Jitter of 1 ms makes 0.05 %."""
 _SMOOTH = 0.05
 _WINDOW, _CHANGED = 24.0, 0.05
 """Counts, of which two windows in a row must tell another rate by this share, and agree within half of it."""
+_ALIKE = 0.6
+"""Gaps between arrivals that differ from most by less, as a share, are those of a step."""
+_TOLD = 0.01
+"""A step that is longer or shorter by less is no other rate."""
 _BACK = 8.0
 """A sample that is older than the last one by at most so many steps was overtaken by it."""
 
@@ -50,6 +63,7 @@ class NodeLine:
         self._wrap = stamp_wrap_s if self._stamped else counter_wrap
         self._far = _RESET_S if self._stamped else _BACK
         self._step_s = 1.0 if self._stamped else period_s
+        self._most_drift = _COUNTED_DRIFT if self._counted else _LARGEST_DRIFT
         self.period_s = period_s
         self._learning: list[tuple[float, float]] = []
         self._own = self._last_s = self._anchor_s = self._anchor_steps = math.nan
@@ -58,6 +72,9 @@ class NodeLine:
         self.missing = self.duplicates = self.resets = self.overtaken = self.rate_changes = 0
         self._strayed = self._mark_s = self._window_step_s = math.nan
         self._marked = 0.0
+        self._arrived_s: list[float] = []
+        self._usual_s, self._usual = 0.0, 0
+        """Sum and number of the usual gaps since the step was compared with them."""
 
     def take(self, arrival_s: float, own: float, newest_s: float, left: int) -> float:
         """When a sample was taken; NaN if it was seen before.
@@ -80,7 +97,7 @@ class NodeLine:
             return self._at(arrival_s)
         expected = before + step_s * delta
         late = arrival_s - expected
-        if self._counted and self._changed_rate(arrival_s, delta):
+        if not self._stamped and self._changed_rate(arrival_s, delta):
             self.rate_changes += 1
             self._anchor_s = math.nan
             return self._at(arrival_s)
@@ -114,19 +131,54 @@ class NodeLine:
         return not follows
 
     def _changed_rate(self, arrival_s: float, delta: float) -> bool:
-        """Whether arrivals tell another rate than the node's count did; then it is taken over."""
+        """Whether arrivals tell another rate than the node's step; then it is taken over."""
+        step_s = self._counted_step(arrival_s, delta) if self._counted else self._usual_step(arrival_s)
+        if math.isnan(step_s):
+            return False
+        before_s, self._window_step_s = self._window_step_s, step_s
+        slower, alike = step_s / self._step_s - 1.0, step_s / before_s - 1.0
+        if abs(slower) > _CHANGED and abs(alike) < 0.5 * _CHANGED:
+            return self._goes_on_with(0.5 * (step_s + before_s))
+        if self._usual_s < _BASE_S:
+            return False
+        usual_s = self._usual_s / self._usual
+        self._usual_s, self._usual = 0.0, 0
+        slips = abs(usual_s / self._step_s - 1.0)
+        if slips > _SLIPS:
+            self._goes_on_with(usual_s)
+        return slips > _TOLD
+
+    def _goes_on_with(self, step_s: float) -> bool:
+        self._step_s = self.period_s = step_s
+        self._usual_s, self._usual = 0.0, 0
+        return True
+
+    def _counted_step(self, arrival_s: float, delta: float) -> float:
+        """The step of a window of counts; NaN until it is full."""
         self._marked += delta
         if math.isnan(self._mark_s) or delta > _WINDOW:
             self._mark_s, self._marked = arrival_s, 0.0
         if self._marked < _WINDOW:
-            return False
-        step_s, before_s = (arrival_s - self._mark_s) / self._marked, self._window_step_s
-        self._mark_s, self._marked, self._window_step_s = arrival_s, 0.0, step_s
-        slower, alike = step_s / self._step_s - 1.0, step_s / before_s - 1.0
-        if not (abs(slower) > _CHANGED and abs(alike) < 0.5 * _CHANGED):
-            return False
-        self._step_s = self.period_s = 0.5 * (step_s + before_s)
-        return True
+            return math.nan
+        step_s = (arrival_s - self._mark_s) / self._marked
+        self._mark_s, self._marked = arrival_s, 0.0
+        return step_s
+
+    def _usual_step(self, arrival_s: float) -> float:
+        """The step of a window of arrivals, without gaps of lost samples and of stalls; NaN until full."""
+        arrived = self._arrived_s
+        arrived.append(arrival_s)
+        if len(arrived) <= _WINDOW:
+            return math.nan
+        self._arrived_s = [arrival_s]
+        gaps = [after - before for before, after in pairwise(arrived)]
+        usual_s = median(gaps)
+        near = [gap for gap in gaps if abs(gap - usual_s) < _ALIKE * usual_s]
+        if len(near) <= _WINDOW / 2.0:
+            return math.nan  # a window of bursts tells nothing
+        self._usual_s += sum(near)
+        self._usual += len(near)
+        return sum(near) / len(near)
 
     def _at(self, arrival_s: float) -> float:
         """A sample of which only its arrival tells the time."""
@@ -184,13 +236,14 @@ class NodeLine:
         ran_s = self._last_s - self._anchor_s
         if ran_s > _BASE_S:
             step_s = ran_s / max(self._steps - self._anchor_steps, 1e-9)
-            if abs(step_s / self._step_s - 1.0) < _LARGEST_DRIFT:
+            if abs(step_s / self._step_s - 1.0) < self._most_drift:
                 self._step_s += 0.5 * (step_s - self._step_s)
         self._anchor_s, self._anchor_steps = self._last_s, self._steps
 
     def lose(self) -> None:
         """Forget when it sampled last; its step's length stays."""
         self._last_s = self._own = self._anchor_s = self._mark_s = self._strayed = math.nan
+        self._arrived_s = []
 
 
 class ClockLines:

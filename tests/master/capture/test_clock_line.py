@@ -125,10 +125,16 @@ def test_an_own_time_that_is_no_number_spoils_its_sample_alone(
     assert np.abs(node.run(301, 1500)[600:]).max() <= 1e-3
 
 
-def throttled(rate_hz: float, kind: str = COUNT, wrap: float = 256.0) -> tuple[Node, Array]:
+def throttled(
+    rate_hz: float, kind: str = COUNT, wrap: float = 256.0, seconds: float = 10.0, lose: float = 0.0
+) -> tuple[Node, Array]:
     """100 Hz for 10 s, then another rate; errors of the sample times from then on."""
     node, errors, true_s = Node(kind, wrap, ppm=0.0), [], 5.0
-    for index in range(1000 + round(10 * rate_hz)):
+    for index in range(1000 + round(seconds * rate_hz)):
+        if node.random.random() < lose:
+            errors.append(0.0)
+            true_s += 0.01 if index < 1000 else 1.0 / rate_hz
+            continue
         at_s = true_s + 2e-4 + node.random.exponential(3e-4)
         errors.append(node.arrive(index, at_s) - true_s)
         true_s += 0.01 if index < 1000 else 1.0 / rate_hz
@@ -146,14 +152,41 @@ def test_a_node_that_counts_and_changes_its_rate_is_learnt_again(rate_hz: float,
     assert node.lines.period_s[0] == pytest.approx(1.0 / rate_hz, rel=0.02)
 
 
-def test_no_jitter_stall_or_loss_is_a_change_of_rate() -> None:
-    node = Node(COUNT, 256.0)
+@pytest.mark.parametrize("lose", [0.0, 0.02])
+@pytest.mark.parametrize("rate_hz", [20.0, 50.0, 80.0, 93.0, 96.0, 99.0, 101.0, 108.0, 120.0, 200.0])
+def test_a_node_that_only_samples_and_changes_its_rate_is_learnt_again(rate_hz: float, lose: float) -> None:
+    """By its old period samples would be taken for lost, and times be off by up to half a period for ever."""
+    node, error = throttled(rate_hz, NONE, 0.0, lose=lose)
+    assert np.abs(error).max() <= 6e-3
+    assert np.percentile(np.abs(error[-round(3.0 * rate_hz) :]), 99.0) < 2e-3
+    assert node.lines.period_s[0] == pytest.approx(1.0 / rate_hz, rel=0.02)
+    assert node.lines.resets[0] == 0
+    # what was taken for lost until then: one of two at half the rate, for two windows
+    assert node.lines.missing[0] <= 250 + 2.0 * lose * (1000 + 10 * rate_hz)
+
+
+@pytest.mark.parametrize(("rate_hz", "changes"), [(98.5, 1), (99.5, 0)])
+def test_a_step_that_differs_by_less_than_a_hundredth_is_no_other_rate(rate_hz: float, changes: int) -> None:
+    node, _ = throttled(rate_hz, NONE, 0.0)
+    assert node.lines.rate_changes[0] == changes
+
+
+@pytest.mark.parametrize("rate_hz", [96.0, 98.0])
+def test_a_counting_node_that_is_slower_by_some_hundredths_grows_no_age_for_ever(rate_hz: float) -> None:
+    """Less than two windows tell, more than a crystal drifts: it stayed 80 ms too old."""
+    _, error = throttled(rate_hz, seconds=40.0)
+    assert np.abs(error[-round(5.0 * rate_hz) :]).max() < 5e-3
+
+
+@pytest.mark.parametrize("kind", [NONE, COUNT])
+def test_no_jitter_stall_or_loss_is_a_change_of_rate(kind: str) -> None:
+    node = Node(kind, 256.0)
     node.run(0, 1000, lose=0.05)
     for first in range(1000, 4000, 100):
         # every second something stands still for 120 ms, and gives all at once
         end_s = float(node.true_s(np.array(first + 12))) + 3e-4
-        for index in range(first, first + 12):
-            node.arrive(index, end_s)
+        own = np.arange(float(first), first + 12) % 256.0
+        node.lines.take(np.zeros(12, np.intp), np.full(12, end_s), np.zeros(12), own)
         node.run(first + 12, first + 100)
     assert node.lines.rate_changes[0] == 0
     assert node.lines.resets[0] == 0
