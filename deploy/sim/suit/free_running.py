@@ -5,6 +5,8 @@ The frames are made by cantools from the DBC, so that nothing of the master's ow
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -29,6 +31,9 @@ class NodeClock:
     """Its clock runs fast by so much."""
     begins_s: float = 0.0
     """What its clock shows at time 0."""
+    throttled_hz: float = 0.0
+    """It samples so often from `throttled_s` on, as a unit does that grows too hot or is set anew; 0: never."""
+    throttled_s: float = math.inf
 
 
 class FreeNode:
@@ -49,7 +54,15 @@ class FreeNode:
     def time_s(self, index: int) -> float:
         """True time of sample `index`."""
         clock = self.clock
-        return clock.phase_s + index / clock.rate_hz * (1.0 - 1e-6 * clock.drift_ppm)
+        before = index
+        if clock.throttled_hz:
+            before = min(index, math.ceil((clock.throttled_s - clock.phase_s) * clock.rate_hz))
+        own_s = before / clock.rate_hz + ((index - before) / clock.throttled_hz if index > before else 0.0)
+        return clock.phase_s + own_s * (1.0 - 1e-6 * clock.drift_ppm)
+
+    def count_until(self, until_s: float) -> int:
+        """So many samples it takes until then."""
+        return next(index for index in itertools.count() if self.time_s(index) > until_s)
 
     def frames(self, index: int) -> list[CanFrame]:
         """What it sends of sample `index`, its first message first."""
@@ -130,7 +143,7 @@ def sent_by(
     sent = []
     for bus, here in nodes.items():
         for node in here:
-            for index in range(int((until_s - node.clock.phase_s) * node.clock.rate_hz) + 1):
+            for index in range(node.count_until(until_s)):
                 at_s = node.time_s(index) + least_delay_s + random.exponential(jitter_s)
                 for place, frame in enumerate(node.frames(index)):
                     if random.random() >= lost_share:

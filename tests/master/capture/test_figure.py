@@ -25,7 +25,14 @@ REST_S = 4.0
 class FreeRun:
     """Nodes of one layout on buses of their own, and the suit that hears them, tick by tick."""
 
-    def __init__(self, layout: MappedLayout, readings: list[Reading], rates_hz: list[float]) -> None:
+    def __init__(
+        self,
+        layout: MappedLayout,
+        readings: list[Reading],
+        rates_hz: list[float],
+        throttled_hz: float = 0.0,
+        throttled_s: float = np.inf,
+    ) -> None:
         random = np.random.default_rng(5)
         count = len(readings)
         self.configs = [NodeConfig(id=1, bus=f"b{k}", layout=layout.name) for k in range(count)]
@@ -34,7 +41,7 @@ class FreeRun:
         self.nodes = {}
         for place, (reading, rate_hz) in enumerate(zip(readings, rates_hz, strict=True)):
             phase_s, drift_ppm, begins_s = random.uniform([0.0, -100.0, 0.0], [0.01, 100.0, 9.0])
-            clock = NodeClock(rate_hz, phase_s, drift_ppm, begins_s)
+            clock = NodeClock(rate_hz, phase_s, drift_ppm, begins_s, throttled_hz, throttled_s)
             self.nodes[f"b{place}"] = [FreeNode(layout, 1, reading, clock)]
         self.random = random
 
@@ -86,3 +93,21 @@ def test_orientations_are_those_of_the_suit_on_sync(
     late = apart_deg(sweeps, readings, run.configs)
     figures = f"median {np.median(late):.3f}, 99 % {np.quantile(late, 0.99):.3f}, worst {late.max():.3f}°"
     assert np.quantile(late, 0.99) <= 0.1, figures
+
+
+@pytest.mark.parametrize("throttled_hz", [50.0, 80.0, 96.0, 120.0])
+def test_a_node_without_count_or_time_that_is_throttled_keeps_the_time(
+    load: Callable[..., MappedLayout], swing: Callable[..., Reading], throttled_hz: float
+) -> None:
+    """Its orientation at the grid's instants is that of the moment: 5 ms at 90°/s would be 0.45°."""
+    readings = [swing(k, rest_s=1.0) for k in range(2)]
+    run = FreeRun(load("bno", 1), readings, [100.0, 100.0], throttled_hz, throttled_s=3.0)
+    off_deg = []
+    for sweep in run.sweeps(17.0, lost_share=0.0):
+        at_s = 1e-9 * sweep.sampled_ns
+        if at_s > 14.0:
+            q = sweep.q_world_from_sensor
+            assert q is not None
+            true = np.array([reading(at_s)[1] for reading in readings])
+            off_deg.append(np.degrees(angle_between(q, true)))
+    assert np.quantile(off_deg, 0.99) < 0.25
