@@ -32,7 +32,7 @@ class NodeClock:
     begins_s: float = 0.0
     """What its clock shows at time 0."""
     throttled_hz: float = 0.0
-    """It samples so often from `throttled_s` on, as a unit does that grows too hot or is set anew; 0: never."""
+    """It samples so often from `throttled_s` on, as one does that grows hot or is set anew; 0: never."""
     throttled_s: float = math.inf
 
 
