@@ -236,20 +236,24 @@ def _examples(nodes: Sequence[str]) -> dict[str, list[str]]:
         "fd = true",
         "options = { port = 43113, hop_limit = 0 }",
     ]
+    process = [
+        "", "[process]",
+        "realtime_priority = 20            # SCHED_FIFO where the host permits it, otherwise a log line", "",
+    ]  # fmt: skip
     worn = ["", "[nodes]", *(f'{name} = {{ id = {i + 1}, bus = "suit" }}' for i, name in enumerate(nodes))]
     return {
         "master": [
             'robots = ["robot-1"]', f'profile = "{OWN_FILE}"', "", "[operator]", 'name = "nurse-1"',
-            'deadman = { source = "always_held" }   # for the simulated robot; a pedal for a real one', "",
-            "[capture]", 'dbc = "suit.dbc"', "", "[[capture.buses]]", *bus, "",
+            'deadman = { source = "always_held" }   # for the simulated robot; a pedal for a real one',
+            *process, "[capture]", 'dbc = "suit.dbc"', "", "[[capture.buses]]", *bus, "",
             "[link]", 'connect = ["tcp/127.0.0.1:7447"]', *worn,
         ],
         "slave": [
-            'robot = "robot-1"', f'profile = "{OWN_FILE}"', "",
+            'robot = "robot-1"', f'profile = "{OWN_FILE}"', *process,
             "[link]", 'listen = ["tcp/0.0.0.0:7447"]', "", "[camera]", 'source = "robot"',
         ],
         "suit": [
-            f'profile = "{OWN_FILE}"', 'motion = "postures"           # or "sweep": joint by joint', "",
+            f'profile = "{OWN_FILE}"', 'motion = "postures"           # or "sweep": joint by joint', *process,
             "[[buses]]", *bus, *worn,
         ],
     }  # fmt: skip
