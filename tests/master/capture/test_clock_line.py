@@ -185,8 +185,8 @@ def test_no_jitter_stall_or_loss_is_a_change_of_rate(kind: str) -> None:
     for first in range(1000, 4000, 100):
         # every second something stands still for 120 ms, and gives all at once
         end_s = float(node.true_s(np.array(first + 12))) + 3e-4
-        own = np.arange(float(first), first + 12) % 256.0
-        node.lines.take(np.zeros(12, np.intp), np.full(12, end_s), np.zeros(12), own)
+        own = [float(index % 256) for index in range(first, first + 12)]
+        node.lines.take([0] * 12, [end_s] * 12, [0.0] * 12, own)
         node.run(first + 12, first + 100)
     assert node.lines.rate_changes[0] == 0
     assert node.lines.resets[0] == 0
