@@ -8,7 +8,7 @@ from common.clock import to_s
 from deploy.harness.faults.fault import ENGAGE
 from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.setting import Setting
-from deploy.harness.faults.touched import Part, body_of, hand, wrist
+from deploy.harness.faults.touched import MetPart, body_of, hand, wrist
 from deploy.harness.faults.virtual import VirtualFault, holds
 from deploy.sim.patient.patient import in_the_way
 from deploy.sim.patient.robot import TouchingRobot
@@ -30,7 +30,7 @@ def _robot(scene: Scene) -> TouchingRobot:
     return robot
 
 
-def _meets(scene: Scene, part: Part | None, *, clamped: bool) -> None:
+def _meets(scene: Scene, part: MetPart | None, *, clamped: bool) -> None:
     robot = _robot(scene)
     assert part is not None
     robot.segment, robot.local_m = part.body, np.array(part.at_m)

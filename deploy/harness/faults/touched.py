@@ -22,7 +22,7 @@ _GRAVITY_M_S2 = 9.81
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class MetPart:
     """A body of the robot, and the point on it that meets somebody, in the body's frame."""
 
     body: str
@@ -39,16 +39,16 @@ def body_of(skeleton: Skeleton, segment: str) -> str | None:
     return None
 
 
-def hand(skeleton: Skeleton) -> Part | None:
+def hand(skeleton: Skeleton) -> MetPart | None:
     """The hand, where its last joint is. At the speed of `align` the least heavy part is what meets.
 
     Farther up a heavy arm meets a free person with less than what is ever noticed (`tandem status`).
     """
     body = body_of(skeleton, _HAND)
-    return None if body is None else Part(body)
+    return None if body is None else MetPart(body)
 
 
-def wrist(skeleton: Skeleton) -> Part | None:
+def wrist(skeleton: Skeleton) -> MetPart | None:
     """Where the hand hangs on the forearm: no joint of the hand has a lever there.
 
     A push at full speed on the end of a hand turns a light wrist faster than its limit, whatever the drives
@@ -62,7 +62,7 @@ def wrist(skeleton: Skeleton) -> Part | None:
     while link.parent in by_name and link.parent != above:
         link = by_name[link.parent]
     at_m = link.hinges[0].anchor_m if link.hinges else (0.0, 0.0, 0.0)
-    return Part(link.name, at_m)
+    return MetPart(link.name, at_m)
 
 
 @lru_cache(maxsize=16)
