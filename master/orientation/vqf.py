@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -140,14 +141,20 @@ def _together(filters: Sequence[VQF]) -> Callable[[Array, Array, Array], None]:
     """Updates n filters with one tick's readings, (n, 3) each.
 
     The filters' rows are made once, and the readings copied into them: 108 rows made anew each tick took a
-    fifth of the update. A function, as what it holds is no memory of the filters that a recording needs.
+    fifth of the update. A partial function, as what it holds is no memory of the filters that a recording
+    needs, and as a copy of the filters must not share it (`deploy/sim/world/copy.py`).
     """
     samples = np.empty((3, len(filters), 3))
-    rows = list(zip(filters, *samples, strict=True))
+    return partial(_update, samples, list(zip(filters, *samples, strict=True)))
 
-    def update(gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
-        samples[0], samples[1], samples[2] = gyr_rad_s, acc_m_s2, mag_ut
-        for vqf, gyr, acc, mag in rows:
-            vqf.update(gyr, acc, mag)
 
-    return update
+def _update(
+    samples: Array,
+    rows: Sequence[tuple[VQF, Array, Array, Array]],
+    gyr_rad_s: Array,
+    acc_m_s2: Array,
+    mag_ut: Array,
+) -> None:
+    samples[0], samples[1], samples[2] = gyr_rad_s, acc_m_s2, mag_ut
+    for vqf, gyr, acc, mag in rows:
+        vqf.update(gyr, acc, mag)
