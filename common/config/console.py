@@ -11,9 +11,21 @@ from pydantic import Field
 from common.config.section import RelativePath, Section
 from common.errors import ConfigMistake
 
-PAGE_KEYS = ("Escape", " ", "F2", "F3", "F4", "F6", "F7")
+PAGE_KEYS = ("Escape", " ", "F2", "F3", "F4", "F6", "F7", "F8")
 """What the page's other keys are called by browsers: the first two stop the robot."""
 _HOST_NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]{0,251}[A-Za-z0-9])?")
+
+
+class CalibrationPageConfig(Section):
+    """`[console.calibration]`: the suit is calibrated as the page leads, beside a master that runs."""
+
+    folder: RelativePath | None = None
+    """Takes the nodes' calibration files and recordings; without it the page calibrates nothing."""
+    gravity_m_s2: float = Field(9.80665, ge=9.7, le=9.9)
+    """At this place."""
+    hemisphere: Literal["north", "south"] = "north"
+    countdown_s: float = Field(5.0, ge=0.0, le=30.0)
+    """From the word "I am ready" until the zero pose is to be held."""
 
 
 class ConsoleConfig(Section):
@@ -43,6 +55,7 @@ class ConsoleConfig(Section):
     """A folder whose reports can be opened from the page, such as that of `tandem trial --out`."""
     study: RelativePath | None = None
     """The folder of a study: the page leads through the session that is under way there."""
+    calibration: CalibrationPageConfig = CalibrationPageConfig()
 
     @property
     def host(self) -> str:

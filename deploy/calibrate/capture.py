@@ -12,7 +12,7 @@ from common.quaternion import Array
 from common.recording import McapRecorder
 from common.recording.sweeps import TOPIC, describe
 from master.capture.polling import OnSweep, SuitCapture
-from master.capture.source import suit_source
+from master.capture.source import SuitSource, suit_source
 from master.config import MasterConfig
 from master.suit.protocol import SuitProtocol
 from master.suit.recorded import encode_sweep
@@ -24,13 +24,17 @@ def names(config: MasterConfig) -> tuple[str, ...]:
     return config.skeleton.segment_names
 
 
-def open_capture(config: MasterConfig, on_sweep: OnSweep) -> SuitCapture:
-    """The suit of a master's file, to be polled as the master does. Opens no bus yet."""
+def open_source(config: MasterConfig) -> SuitSource:
+    """The suit of a master's file. Opens no bus."""
     capture = config.capture
     fd = {bus.name: bus.fd for bus in capture.buses}
     protocol = SuitProtocol.load(capture.dbc)
-    source = suit_source(names(config), config.nodes, config.suit, protocol, capture.lost_after, fd)
-    return SuitCapture(source, capture.buses, capture.rate_hz, on_sweep)
+    return suit_source(names(config), config.nodes, config.suit, protocol, capture.lost_after, fd)
+
+
+def open_capture(config: MasterConfig, on_sweep: OnSweep) -> SuitCapture:
+    """The suit of a master's file, to be polled as the master does. Opens no bus yet."""
+    return SuitCapture(open_source(config), config.capture.buses, config.capture.rate_hz, on_sweep)
 
 
 def open_recorder(config: MasterConfig, path: Path) -> McapRecorder:

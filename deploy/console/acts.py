@@ -25,6 +25,8 @@ MARK = "mark"
 """A line that a person adds to the events: no request to a robot."""
 OF_THE_LIST = (Action.TAKE, Action.RELEASE)
 """What may be asked of a robot that this console only lists."""
+MOVES = (Action.ENGAGE, Action.TAKE_UP)
+"""After these a robot follows the suit."""
 _MOST_GROUPS = 16
 _LONGEST = 128
 

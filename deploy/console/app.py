@@ -24,7 +24,10 @@ from deploy.console.session import Person, RateLimit
 from deploy.console.study import questionnaires
 from deploy.console.viewers import REQUESTS_PER_S
 
-PAGES = {"/": "index.html", "/engineer": "engineer.html", "/study": "study.html", "/code": "code.html"}
+PAGES = {
+    "/": "index.html", "/engineer": "engineer.html", "/study": "study.html", "/calibrate": "calibrate.html",
+    "/code": "code.html",
+}  # fmt: skip
 """The last is a screen for a real camera to look at: it shows the time of this host as codes."""
 READS_PER_S = 200.0
 """Files and sockets a second, and as many at once, for one client; a page has some twenty files."""

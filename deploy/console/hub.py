@@ -15,6 +15,7 @@ from common.metrics.tree import to_tree
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from common.wire.video import JPEG
+from deploy.console.calibration import CalibrationDesk
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.model.guard_table import ENGAGED
 from deploy.console.model.robot import RobotModel
@@ -50,6 +51,7 @@ class Hub:
     losing_page_stops: bool = False
     desk: StudyDesk = field(default_factory=StudyDesk)
     reports: ReportFolder = field(default_factory=ReportFolder)
+    calibration: CalibrationDesk = field(default_factory=CalibrationDesk)
     opened: OpenedRobots | None = None
     """The list of all robots that are there, of which a page may open others; None: there is no list."""
     pages: list[OpenPage] = field(default_factory=list)
@@ -69,6 +71,16 @@ class Hub:
     def robots(self) -> tuple[str, ...]:
         """The robots that pages can show now, the file's own first."""
         return tuple(self.models)
+
+    @property
+    def engaged_robots(self) -> list[str]:
+        """Robots that follow an operator or move to their posture, as far as was heard."""
+        return [robot for robot, model in self.models.items() if model.guard in ENGAGED]
+
+    def calibrates(self, desk: CalibrationDesk) -> None:
+        """Show what this desk shows."""
+        self.calibration = desk
+        desk.on_shown = self._show_calibration
 
     def turn(self, page: OpenPage, robot: str) -> str:
         """Let a page show another robot, opened if need be; why not, else empty."""
@@ -131,6 +143,8 @@ class Hub:
                 "hold": role.acts and self.deadman is not None,
             },
         })  # fmt: skip
+        if self.calibration.shown is not None:
+            page.show("calibration", pack(self.calibration.shown), {})
 
     def on_picture(self, model: RobotModel, camera: str) -> None:
         """A newer picture came."""
@@ -163,6 +177,7 @@ class Hub:
                 await self._list_robots(now_ns)
             self._watch_pages(now_ns)
             self._watch_deadman(now_ns)
+            self.calibration.watch(self.engaged_robots)
             for page in self.pages:
                 page.tell_stop(now_ns)
 
@@ -221,6 +236,12 @@ class Hub:
                     for other in self.pages
                 ]
                 page.show("facts", body, {"viewers": viewers, "glass": page.glass.shown(now_ns)})
+
+    def _show_calibration(self) -> None:
+        if self.calibration.shown is not None:
+            body = pack(self.calibration.shown)
+            for page in self.pages:
+                page.show("calibration", body, {})
 
     async def _list_robots(self, now_ns: int) -> None:
         """Show who is there, and close what no page shows."""

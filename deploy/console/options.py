@@ -12,6 +12,7 @@ from common.errors import TandemError
 from common.skeleton import load_skeleton
 from deploy.client.destination import destination
 from deploy.client.own_door import own_doors
+from deploy.console.calibration import CalibrationPlace
 from deploy.console.model.robot import Side
 from deploy.console.run import ConsoleOptions
 from master.config import MasterConfig
@@ -76,7 +77,17 @@ def _at_the_operator(chosen: ConsoleChoices) -> ConsoleOptions:
         deadman_socket=hold.socket if isinstance(hold, ConsoleHold) else None,
         zones=zones,
         recordings=None if file is None else file.recording.folder,
+        calibration=_calibration(chosen, file, tap),
     )
+
+
+def _calibration(
+    chosen: ConsoleChoices, file: MasterConfig | None, tap: Path | None
+) -> CalibrationPlace | None:
+    """Where the operator's suit can be calibrated; None where something of it is not named."""
+    if chosen.master is None or file is None or tap is None or file.console.calibration.folder is None:
+        return None
+    return CalibrationPlace(chosen.master, tap, file.console.calibration, chosen.overrides)
 
 
 def _at_the_robot(chosen: ConsoleChoices) -> ConsoleOptions:

@@ -11,7 +11,7 @@ from common.clock import monotonic_ns
 from common.link import LinkSession
 from common.wire.messages import Action
 from deploy.client.destination import Destination
-from deploy.console.acts import MARK, carry_out, may_act, read_act, read_mark
+from deploy.console.acts import MARK, MOVES, ActRefusedError, carry_out, may_act, read_act, read_mark
 from deploy.console.hub import Hub
 from deploy.console.replies import Visitors, answer, body_of, error_answer
 from deploy.console.session import SESSION_S, Person
@@ -48,6 +48,7 @@ class PostHandlers:
             web.post("/api/logout", self._log_out),
             web.post("/api/act", self._act),
             web.post("/api/study", self._study),
+            web.post("/api/calibrate", self._calibrate),
             web.post(STOP_PATH, self._stop),
         ]
 
@@ -95,6 +96,8 @@ class PostHandlers:
             self._hub.models[robot].events.add(MARK, f"{person.name}: {text}", monotonic_ns())
             return answer({"done": True, "text": words, "guard": ""})
         act = read_act(body, self._hub.robots, person, self._lists)
+        if act.action in MOVES and self._hub.calibration.under_way:
+            raise ActRefusedError(409, "the suit is being calibrated: end that first")
         if self._session is None:
             return error_answer(503, "there is no link to the robot")
         log.warning("%s: %s asks for %s", act.robot, person.name, act.action)
@@ -116,6 +119,14 @@ class PostHandlers:
         body = await body_of(request)
         may_act(self._visitors.of(request)[1])
         return answer({"done": True, "text": self._hub.desk.act(body)})
+
+    async def _calibrate(self, request: web.Request) -> web.StreamResponse:
+        body = await body_of(request)
+        person = self._visitors.of(request)[1]
+        may_act(person)
+        words = await self._hub.calibration.act(body, self._hub.engaged_robots)
+        log.warning("%s: calibration: %s: %s", person.name, body.get("do"), words)
+        return answer({"done": True, "text": words})
 
     async def _stop(self, request: web.Request) -> web.StreamResponse:
         return self._stopped(request, await body_of(request))

@@ -23,6 +23,7 @@ from common.wire.version import software
 from deploy.client.destination import Destination
 from deploy.console.app import ConsoleApp
 from deploy.console.backup import StopBackup
+from deploy.console.calibration import CalibrationDesk, CalibrationPlace
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.hearing import Hearing
 from deploy.console.hub import VIEW_HZ, Hub, person_of, stranger
@@ -63,6 +64,8 @@ class ConsoleOptions:
     """The robot's zones; None: not known here."""
     recordings: Path | None = None
     """`[recording] folder` of this host: where marks go while no session is under way."""
+    calibration: CalibrationPlace | None = None
+    """Where the operator's suit can be calibrated; None: not from this console."""
     on_ready: Callable[[str], None] = field(default=lambda line: None)
     """Takes each line for the person who started it: addresses with their tokens."""
 
@@ -145,6 +148,7 @@ async def _serve(
     hub.opened = opened
     hub.desk = StudyDesk(config.study, options.recordings)
     hub.reports = ReportFolder(config.reports)
+    hub.calibrates(CalibrationDesk(options.calibration))
     hearing.on_picture = hub.on_picture
     keyframes = KeyframeRequests(session)
     hub.put_key, opened.on_close = keyframes.put, keyframes.forget
@@ -183,6 +187,7 @@ async def _serve(
             tasks.create_task(_offer_again(offer, options.where.operator))
             await hub.show()
     finally:
+        await hub.calibration.close()
         await runner.cleanup()
 
 
@@ -222,6 +227,7 @@ def _setup(options: ConsoleOptions) -> dict[str, object]:
         "silent_s": SILENT_S,
         "rate_hz": VIEW_HZ,
         "window": WINDOW,
+        "calibrates": options.calibration is not None,
         "zones": list(options.zones or ()),
         "zones_known": options.zones is not None,
         **scene(options.skeleton),

@@ -39,7 +39,22 @@ class GuideOptions:
     move_joints_s: float = 20.0
     """So long must every joint have moved."""
     by_word: bool = False
-    """The zero pose begins when the person says so."""
+    """The zero pose begins when the person says so,"""
+    countdown_s: float = 0.0
+    """and so many seconds later: who wears the suit may not reach a key and stand at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroPoseView:
+    """How far the zero pose is."""
+
+    waits: bool
+    """The person has still to say that they stand."""
+    countdown_s: float
+    """Until the pose is to be held."""
+    held_s: float
+    """For which all nodes were at rest by now."""
+    wanted_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +68,8 @@ class View:
     title: str
     todo: str
     nodes: list[NodeProgress]
+    zero_pose: ZeroPoseView | None = None
+    """In that step."""
 
     @property
     def share(self) -> float:
@@ -74,7 +91,7 @@ class Guide:
         self._names = _steps(options.what)
         self._at = 0
         self._tumble = TumbleStep(self._count, magnetometer, options.coverage, options.tumble_s)
-        self._zero_pose = ZeroPoseStep(self._count, options.zero_pose_s, options.by_word)
+        self._zero_pose = ZeroPoseStep(self._count, options.zero_pose_s, options.by_word, options.countdown_s)
         self._step = self._begin(self._names[0])
         self._readings: list[Array] = []
         self._held = 0
@@ -120,8 +137,11 @@ class Guide:
             return View("done", steps, steps, "Done", "Thank you. Now it is computed.", [])
         nodes = step.progress()
         for i in np.flatnonzero(self._silent_s >= _SILENT_S):
-            nodes[i] = NodeProgress(0.0, "silent: look at its plug")
-        return View(self.step, self._at + 1, steps, step.title, step.todo, nodes)
+            nodes[i] = NodeProgress(0.0, "silent")
+        pose = self._zero_pose
+        shown = ZeroPoseView(pose.waits, pose.countdown_s, pose.held_s, self._options.zero_pose_s)
+        zero_pose = shown if self.step == "zero_pose" else None
+        return View(self.step, self._at + 1, steps, step.title, step.todo, nodes, zero_pose)
 
     def _take(self, window: ReadingsWindow) -> None:
         if self._step is None:

@@ -100,6 +100,10 @@ class LiveSession:
                 self._switch(self._guide.step)
         return self._guide.view()
 
+    def word(self) -> None:
+        """The person says so: see `Guide.word`."""
+        self._guide.word()
+
     def end(self) -> None:
         """Close the recordings, and say in `session` how far it came. May take as long as the disk."""
         for recorder in self._recorders:

@@ -58,18 +58,18 @@ class AttitudesStep:
 
     def _of(self, i: int) -> NodeProgress:
         found = self._found[i]
-        count = f"{len(found)} of {self._wanted}"
+        count = {"found": str(len(found)), "wanted": str(self._wanted)}
         if len(found) >= self._wanted:
             if spread(np.array(found)) >= LEAST_SPREAD:
-                return NodeProgress(1.0, f"{len(found)} attitudes")
-            return NodeProgress(0.95, f"{count}, all alike: put it upside down, on its edges")
+                return NodeProgress(1.0, "attitudes", {"found": str(len(found))})
+            return NodeProgress(0.95, "alike", count)
+        share = len(found) / self._wanted
         if self._counted[i]:
-            hint = "turn it on"
-        elif self._rest_s[i] > 0.0:
-            hint = f"keep still, {max(0.0, self._still_s - self._rest_s[i]):.1f} s"
-        else:
-            hint = "lay it down"
-        return NodeProgress(len(found) / self._wanted, f"{count}; {hint}")
+            return NodeProgress(share, "turn_on", count)
+        if self._rest_s[i] > 0.0:
+            left_s = max(0.0, self._still_s - self._rest_s[i])
+            return NodeProgress(share, "keep_still", {**count, "left": f"{left_s:.1f}"})
+        return NodeProgress(share, "lay_down", count)
 
 
 def spread(directions: Array) -> float:
@@ -119,15 +119,15 @@ class TumbleStep:
 
     def _of(self, i: int, field: Array) -> NodeProgress:
         if not self._has[i]:
-            return NodeProgress(1.0, "no magnetometer")
+            return NodeProgress(1.0, "no_magnetometer")
         covered = self._coverage(field[np.isfinite(field).all(axis=1)])
-        text = f"{100.0 * covered:.0f} % of all directions, {100.0 * self._wanted:.0f} % wanted"
+        percent = {"percent": f"{100.0 * covered:.0f}"}
         share = covered / self._wanted
         if self._least_s > 0.0:
             share = min(share, self._seconds / self._least_s)
         if share >= 1.0:
-            return NodeProgress(1.0, f"{100.0 * covered:.0f} % of all directions")
-        return NodeProgress(share, text)
+            return NodeProgress(1.0, "seen", percent)
+        return NodeProgress(share, "sees", {**percent, "wanted": f"{100.0 * self._wanted:.0f}"})
 
     def _coverage(self, field: Array) -> float:
         if len(field) < 2:
@@ -172,7 +172,7 @@ class WearStep:
     def progress(self) -> list[NodeProgress]:
         """Every node, in order."""
         share = min(1.0, self._seconds / _WORN_S)
-        return [NodeProgress(share, "worn" if share >= 1.0 else "not moving by itself yet")] * self._nodes
+        return [NodeProgress(share, "worn" if share >= 1.0 else "not_worn")] * self._nodes
 
 
 class ZeroPoseStep:
@@ -181,10 +181,12 @@ class ZeroPoseStep:
     title = "Stand in the zero pose"
     todo = "Stand upright, look ahead, arms hanging, palms facing the thighs, fingers straight. Keep still."
 
-    def __init__(self, nodes: int, zero_pose_s: float, wait_for_word: bool) -> None:
-        """With `wait_for_word` the zero pose counts only once the person says so."""
+    def __init__(self, nodes: int, zero_pose_s: float, wait_for_word: bool, countdown_s: float = 0.0) -> None:
+        """With `wait_for_word` the zero pose counts only once the person says so, and `countdown_s` later."""
         self._wanted_s = zero_pose_s
         self._confirmed = not wait_for_word
+        self._countdown_s = countdown_s
+        self._left_s = 0.0
         if wait_for_word:
             self.todo += " Press Enter as you begin."
         self._rest_s = 0.0
@@ -194,8 +196,25 @@ class ZeroPoseStep:
         self._nodes = nodes
 
     def word(self) -> None:
-        """The person says: I stand."""
-        self._confirmed = True
+        """The person says: I stand. Said again while it counts down: call it off."""
+        called_off = self._confirmed and self._left_s > 0.0
+        self._left_s = 0.0 if called_off or self._confirmed else self._countdown_s
+        self._confirmed = not called_off
+
+    @property
+    def waits(self) -> bool:
+        """Whether the person has still to say that they stand."""
+        return not self._confirmed
+
+    @property
+    def countdown_s(self) -> float:
+        """Seconds until the pose is to be held; 0 where it is now, or nobody has asked."""
+        return max(0.0, self._left_s)
+
+    @property
+    def held_s(self) -> float:
+        """Seconds for which all nodes have been at rest."""
+        return self._rest_s
 
     def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
@@ -203,7 +222,9 @@ class ZeroPoseStep:
         if self._rest_s >= self._wanted_s:
             return
         self._still = window.still | ~window.answered
-        if self._confirmed and self._still.all() and window.answered.any():
+        counts = self._confirmed and self._left_s <= 0.0
+        self._left_s = max(0.0, self._left_s - window.seconds)
+        if counts and self._still.all() and window.answered.any():
             self._rest_s += window.seconds
             self._mean_rates.append(window.mean[:, 3:6])
         else:
@@ -224,7 +245,9 @@ class ZeroPoseStep:
         """Every node, in order."""
         share = min(1.0, self._rest_s / self._wanted_s)
         return [
-            NodeProgress(share, f"still, {self._rest_s:.1f} s" if still else "moves")
+            NodeProgress(share, "still", {"seconds": f"{self._rest_s:.1f}"})
+            if still
+            else NodeProgress(share, "moves")
             for still in self._still.tolist()
         ]
 
@@ -265,7 +288,8 @@ class MoveJointsStep:
 
     def _of(self, seconds: float, alone: bool) -> NodeProgress:
         if alone:  # it hangs on no other: the joints on it tell how it sits
-            return NodeProgress(1.0, "moves with its neighbours")
+            return NodeProgress(1.0, "neighbours")
         if seconds >= self._wanted_s:
-            return NodeProgress(1.0, "moved enough")
-        return NodeProgress(seconds / self._wanted_s, f"moved {seconds:.0f} of {self._wanted_s:.0f} s")
+            return NodeProgress(1.0, "moved")
+        places = {"seconds": f"{seconds:.0f}", "wanted": f"{self._wanted_s:.0f}"}
+        return NodeProgress(seconds / self._wanted_s, "moving", places)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from common.quaternion import Array
 from common.wire.messages import Mask
+from deploy.calibrate.live.hints import HINTS
 
 WINDOW_S = 0.25
 """Readings are judged over windows this long."""
@@ -23,7 +25,15 @@ class NodeProgress:
 
     share: float
     """0 to 1: of what is wanted."""
-    text: str
+    hint: str
+    """A name of `HINTS`."""
+    places: Mapping[str, str] = field(default_factory=dict)
+    """The figures in it."""
+
+    @property
+    def text(self) -> str:
+        """The hint in English."""
+        return HINTS[self.hint].format(**self.places)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ const $ = (id) => document.getElementById(id);
 const ENGAGE_MS = 1000;
 const OFF_DEG = 5;
 const engineer = document.body.dataset.page === "engineer";
-const MORE = { engineer: "./engineer.js", study: "./study.js" };
+const MORE = { engineer: "./engineer.js", study: "./study.js", calibrate: "./calibrate.js" };
 const seen = { hello: null, view: null, facts: null, setup: null, opened_ms: performance.now(), stopAsked: null, holdKey: "F9" };
 const parts = {};
 // the one that is on the screen; before there is any, the one that was asked for and not one in its place
@@ -22,6 +22,7 @@ const robotOf = () => seen.view?.robot ?? link.robot ?? seen.hello?.robot ?? see
 
 const link = new Link({
   hello, view, facts, fleet, picture: gotPicture,
+  calibration: (message) => ((seen.calibration = message), parts.more?.calibration?.(message)),
   answer: (answer) => (answer.to === "stop" ? answer.done && stopConfirmed() : tell(answer.text, answer.done)),
   stop: ({ stop: told }) => ((seen.stop = told), showStop()), // to a page that is shown nothing else
   bye: (bye) => tell(bye.why, false),
@@ -52,6 +53,7 @@ const KEYS = {
   F4: { down: mark },
   F6: { down: fullScreen },
   F7: { down: changeLanguage },
+  F8: { down: () => parts.more?.word?.() },
 };
 
 function keyDown(event) {
@@ -428,6 +430,7 @@ async function start() {
     parts.more = await import(MORE[document.body.dataset.page]);
     parts.more.wire?.({ post: (path, body) => link.post(path, body), tell });
     if (seen.setup) parts.more.prepare(seen.setup);
+    if (seen.calibration) parts.more.calibration?.(seen.calibration);
   }
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
   if (token) {

@@ -61,6 +61,8 @@ class FakeConsole:
         self.coded = False
         """Each picture shows the time of this host as a code."""
         self.reports: list[dict[str, str]] = []
+        self.calibration: dict[str, Any] | None = None
+        """What the page of calibration is shown; each other value is sent once."""
         self.still = False
         """The robot and its operator do not move."""
         self.received: list[dict[str, Any]] = []
@@ -148,7 +150,7 @@ class FakeConsole:
             "deadman": "console",
             "guard_states": [str(state) for state in State],
             "transitions": [[str(a), str(event), str(b)] for (a, event), b in TRANSITIONS.items()],
-            "zones": [_BED],
+            "zones": [_BED], "calibrates": True,
             "zones_known": True, "cameras": ["head"], "stale_picture_s": 0.5, "silent_s": 0.5, "rate_hz": 25,
             "window": WINDOW, **self.shape, **self.setup,
         })  # fmt: skip
@@ -206,6 +208,7 @@ class FakeConsole:
             await asyncio.sleep(0.04)
         who = {"role": self.role, "person": "nurse-1", "may": self.may, "session": "0badcafe"}
         n, turn, facts_turn, told = 0, 0, 0, ""
+        led: dict[str, Any] | None = None
         while True:
             if told != self.robot:
                 told = self.robot
@@ -218,6 +221,9 @@ class FakeConsole:
                 await socket.send_json({"kind": "stop", "stop": self.told_stop})
             if self.silent or self.mute or self.role == "nobody" or n - acknowledged["n"] >= WINDOW:
                 continue
+            if self.calibration != led and (led := self.calibration) is not None:
+                n += 1
+                await socket.send_json({"kind": "calibration", "n": n, **led})
             n += 1
             await socket.send_json(self._view(n))
             if turn >= facts_turn:
@@ -349,6 +355,20 @@ _FACTS: dict[str, Any] = {
     "viewers": [{"person": "nurse-1", "robot": "robot-1", "this": True}],
     "console": {"cpu_percent": 1.4, "rss_mb": 57, "skipped": 0},
 }  # fmt: skip
+LED: dict[str, Any] = {
+    "under_way": True, "what": ["align"],
+    "view": {
+        "step": "zero_pose", "number": 2, "steps": 3, "share": 0.0,
+        "places": {"attitudes": "20", "still": "3", "seconds": "3"},
+        "zero_pose": {"waits": True, "countdown_s": 0.0, "held_s": 0.0, "wanted_s": 3.0},
+        "nodes": [
+            {"name": "left_forearm", "share": 0.0, "hint": "silent", "places": {}},
+            {"name": "right_hand", "share": 0.0, "hint": "moves", "places": {}},
+            {"name": "head", "share": 1.0, "hint": "still", "places": {"seconds": "3.0"}},
+        ],
+    },
+}  # fmt: skip
+"""A suit that is being calibrated."""
 STUDY: dict[str, Any] = {
     "subject": "k7pd", "session": "01", "protocol": "cup", "done": 1, "steps": 2, "since_s": 12.0,
     "step": {"name": "questions", "text": {"en": "Answer.", "zh": "请填写。"}, "seconds": 60.0,

@@ -10,7 +10,7 @@ import pytest
 import simplejpeg
 
 from tests.browser.console.browser import CHROMIUM
-from tests.browser.console.fake import STUDY, FakeConsole
+from tests.browser.console.fake import LED, STUDY, FakeConsole
 from tests.browser.console.steps import state, until
 
 pytestmark = [
@@ -79,7 +79,7 @@ def show(page: Any, fake: FakeConsole, wanted: str) -> None:
     until(page, lambda: state(page) == wanted)
 
 
-@pytest.mark.parametrize("path", ["/", "/engineer", "/study"])
+@pytest.mark.parametrize("path", ["/", "/engineer", "/study", "/calibrate"])
 @pytest.mark.parametrize("language", ["en", "zh"])
 @pytest.mark.parametrize("size", [(1366, 768), (1920, 1080)])
 def test_nothing_overflows_and_nothing_covers_the_stop(
@@ -87,6 +87,7 @@ def test_nothing_overflows_and_nothing_covers_the_stop(
 ) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     fake.facts = {"study": STUDY, "effort_nm": [-12.3] * 25, "drives": {"temperature_c": [41.0] * 25}}
+    fake.calibration = LED
     page.goto(fake.address + path)
     until(page, lambda: state(page) == "follows")
     if language == "zh":
@@ -142,7 +143,7 @@ def test_states_differ_without_colour_in_word_and_in_figure(page: Any, fake: Fak
         assert both / either < 0.8, f"{one} and {other} look alike"
 
 
-@pytest.mark.parametrize("path", ["/", "/engineer", "/study"])
+@pytest.mark.parametrize("path", ["/", "/engineer", "/study", "/calibrate"])
 @pytest.mark.parametrize("wanted", ["follows", "stopped", "no_robot"])
 def test_axe_finds_nothing_serious(page: Any, fake: FakeConsole, path: str, wanted: str) -> None:
     axe = pytest.importorskip(

@@ -375,7 +375,7 @@ def test_a_joint_that_a_limit_holds_back_is_named(page: Any, fake: FakeConsole) 
     until(page, lambda: page.locator("#joints tr.limited").count() == 1)
 
 
-@pytest.mark.parametrize("path", ["/", "/engineer", "/study"])
+@pytest.mark.parametrize("path", ["/", "/engineer", "/study", "/calibrate"])
 def test_every_page_has_the_banner_the_stop_and_the_keys(page: Any, fake: FakeConsole, path: str) -> None:
     page.goto(fake.address + path)
     until(page, lambda: state(page) == "follows")

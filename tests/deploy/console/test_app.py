@@ -49,7 +49,7 @@ def still(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_pages_and_their_files_are_served_with_a_policy() -> None:
     async def story(console: Served) -> None:
-        for path in ("/", "/engineer", "/study"):
+        for path in ("/", "/engineer", "/study", "/calibrate"):
             async with console.http.get(console.url + path) as response:
                 assert response.status == 200
                 assert response.content_type == "text/html"

@@ -11,6 +11,7 @@ from common.can.config import BusConfig
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.calibrate.live.guide import Guide, GuideOptions, StepName
+from deploy.calibrate.live.steps import ZeroPoseStep
 from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.suit import _wearer
 from deploy.sim.suit.tray import TrayConfig
@@ -145,6 +146,41 @@ def test_the_zero_pose_waits_for_the_word_where_a_person_can_give_it(readings: A
     run.guide.word()
     led(readings[worn_from:], options, run.guide)
     assert run.guide.step in ("move_joints", "done")
+
+
+def test_the_zero_pose_counts_only_once_the_countdown_is_over(readings: Array) -> None:
+    options = GuideOptions(("align",), by_word=True, countdown_s=2.0, move_joints_s=6.0)
+    run = led(readings)
+    still_from = round((run.began_s["zero_pose"] + run.guide.zero_pose_s[0]) * RATE_HZ)
+    pose = readings[still_from : still_from + 100]
+    guide = Guide([True] * 15, HAND.parents.tolist(), RATE_HZ, options)
+    led(readings[round(run.began_s["wear"] * RATE_HZ) :], options, guide)
+    assert guide.step == "zero_pose"
+    shown = guide.view().zero_pose
+    assert shown is not None
+    assert (shown.waits, shown.countdown_s) == (True, 0.0)
+    guide.word()
+    held = []
+    for k in range(0, 12 * 30, 12):  # windows of 0.25 s of somebody who stands still all the time
+        guide.add(pose[(k % 84) : (k % 84) + 12])
+        shown = guide.view().zero_pose
+        if shown is not None:
+            held.append((round(shown.countdown_s, 2), round(shown.held_s, 2)))
+    assert [at for at, _ in held[:3]] == [1.76, 1.52, 1.28]
+    first = next(k for k, (_, seconds) in enumerate(held) if seconds > 0.0)
+    assert held[first - 1][0] == 0.0
+    assert all(seconds == 0.0 for at, seconds in held if at > 0.0)
+    assert guide.step == "move_joints"
+
+
+def test_a_second_word_calls_the_countdown_off() -> None:
+    step = ZeroPoseStep(1, 3.0, True, 5.0)
+    step.word()
+    assert step.countdown_s == 5.0
+    assert not step.waits
+    step.word()
+    assert step.countdown_s == 0.0
+    assert step.waits
 
 
 def test_a_person_may_go_on_with_what_there_is(readings: Array) -> None:
