@@ -160,9 +160,11 @@ class CalibrationDesk:
                     self._show(json.loads(line))
             await asyncio.wait_for(process.wait(), END_S)
         except TimeoutError:
-            process.kill()
-            await process.wait()
+            log.error("the calibration's process did not end; it is killed")
         finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()
             self._process = None
             shown = self.shown or {}
             if "outcome" not in shown and "error" not in shown:

@@ -44,7 +44,15 @@ def test_it_is_led_at_the_tap_and_keeps_what_was_recorded(tmp_path: Path) -> Non
     async def story() -> None:
         playing = asyncio.create_task(play(tap, messages))
         desk = CalibrationDesk(place)
-        await asyncio.sleep(0)
+        try:
+            await lead(desk)
+        finally:
+            await desk.close()
+            playing.cancel()
+            await asyncio.gather(playing, return_exceptions=True)
+
+    async def lead(desk: CalibrationDesk) -> None:
+        await asyncio.sleep(0)  # the tap is there
         await desk.act({"do": "begin", "what": ["imu", "align"]}, [])
         shown = await shows(desk, lambda told: told.get("view", {}).get("share", 0) > 0 or "error" in told)
         view = shown["view"]
@@ -55,8 +63,6 @@ def test_it_is_led_at_the_tap_and_keeps_what_was_recorded(tmp_path: Path) -> Non
         await desk.act({"do": "end"}, [])
         shown = await shows(desk, lambda told: not told["under_way"])
         assert shown["error"].startswith("ended by a person")
-        playing.cancel()
-        await asyncio.gather(playing, return_exceptions=True)
 
     asyncio.run(story())
     nodes = load_recordings(folder / "tray.mcap")

@@ -41,7 +41,7 @@ async def shows(one: CalibrationDesk, holds: Callable[[dict[str, Any]], object])
     """Waits until what is shown holds."""
     changed = asyncio.Event()
     one.on_shown = changed.set
-    async with asyncio.timeout(20.0):
+    async with asyncio.timeout(90.0):
         while not holds(one.shown or {}):
             await changed.wait()
             changed.clear()
