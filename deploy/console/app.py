@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 
@@ -60,6 +61,8 @@ class ConsoleApp:
         self._posts = PostHandlers(hub, self._visitors, where, session, on_login, secure)
         self._files = files or PageFiles()
         self._throttle = LogThrottle()
+        self._reports: asyncio.Future[list[dict[str, str]]] | None = None
+        """A walk through the folder of reports that is under way."""
         self._rates: dict[tuple[str, float], RateLimit] = {}
 
     def make(self) -> web.Application:
@@ -130,11 +133,17 @@ class ConsoleApp:
 
     async def _list_reports(self, request: web.Request) -> web.StreamResponse:
         self._must_see(request)
-        return answer({"reports": self._hub.reports.listed()})
+        if self._reports is None:  # all who ask meanwhile get the answer of one walk
+            self._reports = asyncio.ensure_future(asyncio.to_thread(self._hub.reports.listed))
+            self._reports.add_done_callback(self._walked)
+        return answer({"reports": await asyncio.shield(self._reports)})
+
+    def _walked(self, _: object) -> None:
+        self._reports = None
 
     async def _report(self, request: web.Request) -> web.StreamResponse:
         self._must_see(request)
-        file = self._hub.reports.find(request.match_info["name"])
+        file = await asyncio.to_thread(self._hub.reports.find, request.match_info["name"])
         if file is None:
             return error_answer(404, "no such report")
         headers = {**HEADERS, "Content-Security-Policy": REPORT_POLICY, "Cache-Control": "no-cache"}
