@@ -77,7 +77,7 @@ def test_each_sensor_is_shown_on_the_figure_and_in_words(suit: Any, fake: FakeCo
     rows = suit.locator("#led-nodes li").all_inner_texts()
     assert [row.split("\n")[0] for row in rows] == ["left forearm", "right hand", "head"]
     assert "silent: look at its plug" in rows[0]
-    assert suit.locator("#led-figure text").all_inner_texts() == ["✕", "!"]
+    assert suit.locator("#led-figure text").all_text_contents() == ["✕", "!"]
     suit.keyboard.press("F7")
     until(suit, lambda: suit.inner_text("#lead-title") == "以零位姿势站立")
     assert "无信号：请检查插头" in suit.locator("#led-nodes li").all_inner_texts()[0]
@@ -108,7 +108,7 @@ def test_the_result_says_what_was_written_what_not_and_what_to_do(suit: Any, fak
     rows = suit.locator("#led-nodes li").all_inner_texts()
     assert "accelerometer and gyroscope: fewer than 12 attitudes" in rows[0]
     assert "written: accelerometer and gyroscope, magnetometer" in rows[1]
-    assert suit.locator("#led-figure text").all_inner_texts() == ["■"]
+    assert suit.locator("#led-figure text").all_text_contents() == ["■"]
     assert suit.inner_text("#lead-outcome") == "align: the zero pose was not held"
 
 
