@@ -53,6 +53,9 @@ class TappedSuit:
         """Count the nodes of a failed bus as lost."""
         self._source.bus_down(bus)
 
+    def set_decimation(self, ticks: int) -> None:
+        """How often the master decides changes no reading."""
+
     def ask_zero_pose(self, by: str, now_ns: int) -> None:
         """What the master does with the operator's wish changes no reading."""
 

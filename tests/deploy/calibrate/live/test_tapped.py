@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 
@@ -20,9 +22,7 @@ def polled(monkeypatch: pytest.MonkeyPatch, bench: RecordedBench, ticks: int) ->
 
     def closing(now_ns: int) -> Sweep:
         sweep = close(now_ns)
-        rows = (sweep.acc_m_s2, sweep.gyr_rad_s, sweep.mag_ut, sweep.fresh, sweep.lost)
-        copies = (row.copy() for row in rows)
-        own.append(Sweep(sweep.tick, sweep.sampled_ns, sweep.frames_in_ns, *copies))
+        own.append(deepcopy(sweep))
         return sweep
 
     monkeypatch.setattr(bench.raw.poll, "close_window", closing)
