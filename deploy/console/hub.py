@@ -7,6 +7,7 @@ import logging
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import psutil
 
@@ -14,7 +15,7 @@ from common.clock import monotonic_ns, to_ns
 from common.metrics.tree import to_tree
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
-from common.wire.video import JPEG
+from common.wire.video import JPEG, VideoFrame
 from deploy.console.calibration import CalibrationDesk
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.model.guard_table import ENGAGED
@@ -24,6 +25,7 @@ from deploy.console.reports import ReportFolder
 from deploy.console.session import Access, PageRole, Person, RateLimit
 from deploy.console.stopping import RobotStopper
 from deploy.console.study import StudyDesk
+from deploy.console.transcode import JpegStreams
 from deploy.console.viewers import KEPT, LOST_S, MOST, OpenPage, pack
 
 VIEW_HZ = 25
@@ -52,6 +54,8 @@ class Hub:
     desk: StudyDesk = field(default_factory=StudyDesk)
     reports: ReportFolder = field(default_factory=ReportFolder)
     calibration: CalibrationDesk = field(default_factory=CalibrationDesk)
+    jpeg: JpegStreams = field(default_factory=JpegStreams)
+    """For pages that cannot decode H.264."""
     opened: OpenedRobots | None = None
     """The list of all robots that are there, of which a page may open others; None: there is no list."""
     pages: list[OpenPage] = field(default_factory=list)
@@ -149,9 +153,27 @@ class Hub:
     def on_picture(self, model: RobotModel, camera: str) -> None:
         """A newer picture came."""
         frame = model.pictures.newest[camera].frame
-        shown = [page.show_picture(camera, frame) for page in self.pages if page.model is model]
+        pages = [page for page in self.pages if page.model is model]
+        jpeg = [page for page in pages if page.wants_jpeg and frame.codec != JPEG]
+        shown = [page.show_picture(camera, frame) for page in pages if page not in jpeg]
         if not all(shown):
             self.ask_for_key(model.robot, camera)
+        key = model.robot, camera
+        if any(page.person.role.sees for page in jpeg):
+            show = partial(self._show_jpeg, model, camera)
+            self.jpeg.offer(key, frame, show, partial(self.ask_for_key, *key))
+        else:
+            self.jpeg.drop(key)
+
+    def _show_jpeg(self, model: RobotModel, camera: str, frame: VideoFrame) -> None:
+        for page in self.pages:
+            if page.model is model and page.wants_jpeg:
+                page.show_picture(camera, frame)
+
+    def want_jpeg(self, page: OpenPage) -> str:
+        """The page cannot decode H.264; why this console cannot help, else empty."""
+        page.wants_jpeg = not self.jpeg.why_not()
+        return self.jpeg.why_not()
 
     def ask_for_key(self, robot: str, camera: str) -> None:
         """A page needs a picture of H.264 that stands alone. Asked seldom: it costs all who receive it."""

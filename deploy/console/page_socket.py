@@ -91,6 +91,9 @@ class PageSockets:
                 return f"more than {REQUESTS_PER_S:g} requests a second"
             elif kind == "shown":
                 page.saw_code(body, now_ns)
+            elif kind == "jpeg":
+                if words := self._hub.want_jpeg(page):
+                    page.say({"kind": "answer", "to": "jpeg", "done": False, "text": words})
             elif kind == "keyframe" and isinstance(camera := body.get("camera"), str):
                 self._hub.ask_for_key(page.model.robot, camera)
             elif kind != "stop":

@@ -54,6 +54,8 @@ class OpenPage:
         self.glass = GlassWatch()
         self.messages = RateLimit(MESSAGES_PER_S)
         self.requests = RateLimit(REQUESTS_PER_S)
+        self.wants_jpeg = False
+        """Its browser cannot decode H.264."""
         self.holds = False
         """Whether this page holds the deadman."""
         self.beat_ns = 0

@@ -26,7 +26,7 @@ const link = new Link({
   answer: (answer) => (answer.to === "stop" ? answer.done && stopConfirmed() : tell(answer.text, answer.done)),
   stop: ({ stop: told }) => ((seen.stop = told), showStop()), // to a page that is shown nothing else
   bye: (bye) => tell(bye.why, false),
-  undecodable: () => tell(t("picture.no_decoder"), false),
+  undecodable: () => link.send({ kind: "jpeg" }), // the console makes JPEG of it, or says why it cannot
 }, new URLSearchParams(location.search).get("robot"));
 let stopConfirmed = () => {};
 const glass = new Glass(link);

@@ -1,6 +1,6 @@
 // Pictures as bitmaps: JPEG each by itself, H.264 by the browser's own decoder, each after the one that it builds on.
 // A picture whose predecessor is missing is not drawn: the one on the screen goes on ageing, and a picture that stands
-// alone is asked for.
+// alone is asked for. A browser that cannot decode H.264 asks the console for JPEG.
 
 const ASK_MS = 500;
 const SLOW = 8; // pictures that the decoder may owe before it is taken for stuck
@@ -56,10 +56,10 @@ class Stream {
 
   take(header, bytes, show) {
     const alone = header.after === 0;
-    if (typeof VideoDecoder === "undefined") return this.missing();
+    if (typeof VideoDecoder === "undefined") return this.cannot();
     if (this.waiting.size >= SLOW) this.reset();
     if (!alone && (header.after !== this.last || !this.decoder)) return this.needsKey();
-    if (alone && !this.open(bytes)) return this.missing();
+    if (alone && !this.open(bytes)) return this.cannot();
     this.last = header.number;
     return new Promise((done) => {
       this.waiting.set(header.number, { header, show, done });
@@ -77,7 +77,7 @@ class Stream {
     if (!codec) return false;
     if (this.decoder?.state === "configured" && this.codec === codec) return true;
     this.reset();
-    const decoder = new VideoDecoder({ output: (frame) => this.output(decoder, frame), error: () => decoder === this.decoder && this.fail() });
+    const decoder = new VideoDecoder({ output: (frame) => this.output(decoder, frame), error: (error) => decoder === this.decoder && this.fail(error) });
     decoder.configure({ codec, optimizeForLatency: true });
     [this.decoder, this.codec] = [decoder, codec];
     return true;
@@ -102,17 +102,27 @@ class Stream {
     }
   }
 
-  fail() {
+  fail(error) {
     for (const { done } of this.waiting.values()) done();
     this.reset();
-    this.needsKey();
+    if (error?.name === "NotSupportedError") this.cannot();
+    else this.needsKey();
   }
 
   needsKey() {
+    this.seldom(this.request);
+  }
+
+  /** This browser has no decoder, or none for this profile. */
+  cannot() {
+    this.seldom(this.missing);
+  }
+
+  seldom(ask) {
     const now_ms = performance.now();
     if (now_ms - (this.asked_ms ?? -ASK_MS) < ASK_MS) return;
     this.asked_ms = now_ms;
-    this.request();
+    ask();
   }
 }
 
