@@ -43,6 +43,10 @@ class TappedSuit:
         """Take one frame."""
         return self._source.on_frame(bus, frame_id, data, now_ns) and self._open
 
+    def frames(self, bus: str, frames: list[tuple[int, bytes, int]]) -> None:
+        """Take frames of a bus of which none is awaited."""
+        self._source.on_frames(bus, frames)
+
     def close(self, now_ns: int) -> None:
         """End the tick."""
         if self._open:
