@@ -1,6 +1,6 @@
 """The suit's calibration as the page leads it: one at a time, in a process of its own, while the robot holds.
 
-The process reads the master's tap and computes as `tandem calibrate live` does (`deploy.calibrate.live.led`).
+The process reads the master's tap and computes as `tandem calibrate live` does (`tandem calibrate led`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ END_S = 5.0
 """A process whose input has ended closes its recordings within this, or is killed."""
 LONGEST = 1 << 20
 """Bytes of a line."""
-_COMMAND = (sys.executable, "-m", "deploy.calibrate.live.led")
+_COMMAND = (sys.executable, "-m", "deploy", "calibrate", "led")
 
 log = logging.getLogger(__name__)
 

@@ -189,6 +189,7 @@ async def _main() -> int:
     return 0
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Lead one calibration; the process's status."""
     os.nice(NICE)
-    sys.exit(asyncio.run(_main()))
+    return asyncio.run(_main())
