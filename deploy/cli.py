@@ -7,7 +7,7 @@ from collections.abc import Callable
 import typer
 
 from deploy.calibrate.commands import app as calibrate_app
-from deploy.calibrate.live.command import live
+from deploy.calibrate.live.command import led, live
 from deploy.console.command import console
 from deploy.experiments.accuracy.commands import app as accuracy_app
 from deploy.experiments.bench.command import app as bench_app
@@ -63,6 +63,7 @@ app = typer.Typer(
 )
 bench_app.command("fleet")(fleet)
 calibrate_app.command("live")(live)
+calibrate_app.command("led", hidden=True)(led)
 suit_app.command("check")(check)
 for _name, _group in {
     "calibrate": calibrate_app, "accuracy": accuracy_app, "keys": keys_app,

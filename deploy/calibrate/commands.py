@@ -27,14 +27,6 @@ app.command("align")(align)
 app.command("record")(record)
 
 
-@app.command("led", hidden=True)
-def _led() -> None:
-    """What the console's page of calibration starts."""
-    from deploy.calibrate.live.led import main
-
-    raise typer.Exit(main())
-
-
 @app.command(
     "mount", hidden=True, context_settings={"ignore_unknown_options": True, "allow_extra_args": True}
 )

@@ -84,6 +84,13 @@ def live(
         raise TandemError("\n".join(refusals))
 
 
+def led() -> None:
+    """What the console's page of calibration starts."""
+    from deploy.calibrate.live.led import main
+
+    raise typer.Exit(main())
+
+
 def _guided(config: MasterConfig, options: GuideOptions, out: Path, console: Console) -> LiveRecordings:
     """Lead the person through the steps and record them. Raises TandemError where it was stopped early."""
     from common.errors import TandemError
