@@ -43,7 +43,7 @@ def faults(
     A robot of one's own is met, loaded and stopped at parts that are found from its model; rows that do not
     apply to it are told with what it lacks.
 
-    Examples: `tandem faults "link" --report faults.json`, `tandem faults contact --profile my_robot`
+    Example: `tandem faults "link" --report faults.json`, `tandem faults contact --profile my_robot`
     """
     from deploy.examples.profiles import NURSING
     from deploy.experiments.faults.document import matrix, tree, within_page
