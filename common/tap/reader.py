@@ -39,7 +39,11 @@ class TapReader:
             ) from None
 
     async def read(self) -> TapMessage:
-        """The next message. Raises TandemError once the process has gone, or speaks another version."""
+        """The next message. Raises TandemError once the process has gone, or speaks another version.
+
+        Others of the loop run between two messages, also where a busy tap always has the next one.
+        """
+        await asyncio.sleep(0)  # before, not after: who is cancelled here has not lost a message
         try:
             size = await asyncio.get_running_loop().sock_recv_into(self._socket, self._buffer)
         except OSError as error:

@@ -20,6 +20,8 @@ from common.errors import TandemError
 WHATS = ("imu", "mag", "align")
 END_S = 5.0
 """A process whose input has ended closes its recordings within this, or is killed."""
+COMPUTE_S = 60.0
+"""One that was computing by then may end that first."""
 LONGEST = 1 << 20
 """Bytes of a line."""
 _COMMAND = (sys.executable, "-m", "deploy", "calibrate", "led")
@@ -48,6 +50,7 @@ class CalibrationDesk:
         self._process: asyncio.subprocess.Process | None = None
         self._begins = False
         self._reading: asyncio.Task[None] | None = None
+        self._overdue: asyncio.TimerHandle | None = None
         self.shown: dict[str, object] | None = None
         self.on_shown: Callable[[], None] = lambda: None
         """Called when there is more to show."""
@@ -97,6 +100,8 @@ class CalibrationDesk:
         if process is not None and process.stdin is not None and not process.stdin.is_closing():
             self._show({"error": why})
             process.stdin.close()
+            within_s = COMPUTE_S if (self.shown or {}).get("computing") else END_S
+            self._overdue = asyncio.get_running_loop().call_later(within_s, self._kill, process)
 
     async def close(self) -> None:
         """The console ends."""
@@ -160,8 +165,11 @@ class CalibrationDesk:
                     self._show(json.loads(line))
             await asyncio.wait_for(process.wait(), END_S)
         except TimeoutError:
-            log.error("the calibration's process did not end; it is killed")
+            self._kill(process)
         finally:
+            if self._overdue is not None:
+                self._overdue.cancel()
+                self._overdue = None
             if process.returncode is None:
                 process.kill()
                 await process.wait()
@@ -171,6 +179,12 @@ class CalibrationDesk:
                 log.error("the calibration's process ended with status %s", process.returncode)
                 self._show({"error": "the calibration failed: see the console's log"})
             self._show({"under_way": False})
+
+    @staticmethod
+    def _kill(process: asyncio.subprocess.Process) -> None:
+        if process.returncode is None:
+            log.error("the calibration's process did not end; it is killed")
+            process.kill()
 
     def _show(self, change: Mapping[str, object]) -> None:
         shown = {**(self.shown or {}), **change}

@@ -6,7 +6,6 @@ its time; decoded by the same code as at the bus, they give the same sweeps.
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 
 from common.can.frame import CanFrame
@@ -71,4 +70,3 @@ async def hear_suit(tap: Path, suit: TappedSuit) -> None:
             message = await reader.read()
             if message.topic == FRAMES:
                 suit.take(message.payload)
-            await asyncio.sleep(0)  # a read that need not wait does not let others run

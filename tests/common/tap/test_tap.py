@@ -56,6 +56,31 @@ def test_a_reader_hears_who_sends_and_then_each_message(tmp_path: Path) -> None:
     run(tmp_path / "tap", story)
 
 
+def test_a_reader_of_a_busy_tap_lets_others_run_between_two_messages(tmp_path: Path) -> None:
+    """Else a page, a stop key or a deadline of the same process waits until the tap is quiet."""
+
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path) as reader:
+            await accepted(sender, 1)
+            for _ in range(10):
+                sender.put("a/topic", b"bytes", 17)
+            turns = 0
+
+            async def other() -> None:
+                nonlocal turns
+                while True:
+                    turns += 1
+                    await asyncio.sleep(0)
+
+            beside = asyncio.create_task(other())
+            for _ in range(10):
+                await reader.read()
+            beside.cancel()
+            assert turns >= 10
+
+    run(tmp_path / "tap", story)
+
+
 def test_a_reader_that_stalls_is_refused_at_once_and_knows_what_it_missed(tmp_path: Path) -> None:
     async def story(sender: TapSender) -> None:
         with TapReader(sender.path) as slow, TapReader(sender.path) as quick:

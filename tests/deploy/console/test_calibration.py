@@ -15,6 +15,7 @@ from common.config.console import CalibrationPageConfig
 from common.errors import TandemError
 from deploy.calibrate.live.guide import WHATS as LED_WHATS
 from deploy.calibrate.live.led import LedOrder
+from deploy.console import calibration
 from deploy.console.calibration import WHATS, CalibrationDesk, CalibrationPlace
 from tests.deploy.console.robots import ROBOT, state
 from tests.deploy.console.served import Served, served
@@ -28,6 +29,7 @@ for line in sys.stdin:
 """
 """Stands for the process: says back what it is told, until its input ends."""
 COMPUTES = 'import sys; sys.stdin.readline(); print(\'{"outcome": {"nodes": {}}}\')'
+HANGS = "import sys; print('{\"view\": {}}', flush=True); sys.stdin.read(); import signal; signal.pause()"
 DIES = "raise SystemExit(3)"
 
 
@@ -100,6 +102,23 @@ def test_the_outcome_stays_shown_and_a_process_that_dies_is_said(tmp_path: Path)
         await dead.act({"do": "begin", "what": ["mag"]}, [])
         shown = await shows(dead, lambda told: told.get("under_way") is False)
         assert "see the console's log" in shown["error"]
+
+    run(story)
+
+
+def test_a_process_that_hangs_with_its_output_open_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the console never ended, and robots could not be engaged again."""
+    monkeypatch.setattr(calibration, "END_S", 0.0)
+
+    async def story() -> None:
+        one = desk(tmp_path, HANGS)
+        await one.act({"do": "begin", "what": ["imu"]}, [])
+        await shows(one, lambda told: "view" in told)
+        async with asyncio.timeout(60.0):
+            await one.close()
+        assert not one.under_way
 
     run(story)
 
