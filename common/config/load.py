@@ -27,6 +27,8 @@ RENAMED = {
 
 CHOOSE = ("source", "shape")
 """The keys by which a section is one of several kinds."""
+REST = "others"
+"""Where a list of tables is read as its first one, the key of those after it. No file has this key."""
 
 
 def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -> Model:
@@ -94,9 +96,18 @@ def override(table: dict[str, object], text: str) -> None:
 
 
 def _place(table: object, loc: Sequence[int | str], kind: str, message: str) -> list[int | str]:
-    """The keys to a mistake, less the names of choices by `CHOOSE` that pydantic puts between them."""
+    """The keys to a mistake as the file has them: less the names of choices by `CHOOSE`, and less `REST`."""
     place: list[int | str] = []
+    first = 0
     for part in loc:
+        if isinstance(table, list) and isinstance(part, str):  # read as its first table, the rest under a key
+            if part == REST:
+                first = 1
+                continue
+            place.append(0)
+            table = table[0]
+        elif isinstance(part, int):
+            part, first = part + first, 0
         if isinstance(table, Mapping) and part not in table and part in map(table.get, CHOOSE):
             continue
         place.append(part)

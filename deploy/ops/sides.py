@@ -46,6 +46,11 @@ def master(
     connect = connect_of(blinded, condition)
     with transports_hidden():
         checked = load_config(config, MasterConfig, [*(set_ or ()), f"link.connect={json.dumps(connect)}"])
+        if checked.link.twin is not None:  # metrics and page name the path that is missing, by its endpoints
+            raise TandemError(
+                f"{config}: link.twin: expected no second path with --blinded, as it is not the condition's: "
+                "take [link.twin] out"
+            )
         run_until_stopped(lambda stop: run(checked, stop, metrics_writer(metrics)))
 
 

@@ -6,9 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from common.config.load import REST
 from common.config.section import Section
 from common.errors import ConfigMistake
 from common.wire.topics import VIDEO_NAME
+
+MOST = 3
+"""Cameras of a robot."""
 
 
 class CameraConfig(Section):
@@ -44,7 +48,7 @@ class CameraConfig(Section):
 class CamerasConfig(CameraConfig):
     """All cameras: the main one, and those beside it."""
 
-    others: list[CameraConfig] = Field(default_factory=list, max_length=2)
+    others: list[CameraConfig] = Field(default_factory=list, max_length=MOST - 1)
 
     @property
     def all(self) -> list[CameraConfig]:
@@ -68,7 +72,9 @@ class CamerasConfig(CameraConfig):
 def _of_list(value: object) -> object:
     """`[[camera]]`: the first is the main one."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
-        return {**value[0], "others": value[1:]}
+        if len(value) > MOST:
+            raise ValueError(f"at most {MOST} cameras, not {len(value)}")
+        return {**value[0], REST: value[1:]}
     return value
 
 

@@ -100,17 +100,17 @@ def host(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
 
 
 def devices(needs: Needs, tree: Tree) -> list[Finding]:
-    """Buses, serial ports, camera."""
+    """Buses, serial ports, cameras."""
     ports = {port: None if is_url(port) else read_device(tree, port) for port in needs.serial_ports}
-    camera = read_device(tree, needs.camera_device)
+    cameras = [("", needs.camera, needs.camera_device), *needs.other_cameras]
     interfaces = read_can(tree, ask_ip())
     return [
         *(judge_interfaces(interfaces) if needs.role == GENERAL else judge_buses(needs.buses, interfaces)),
         *(judge_port(port, device) for port, device in ports.items()),
         *(
-            [judge_camera(needs.camera, camera, egl_is_there(), v4l2_is_there())]
+            judge_camera(source, read_device(tree, device), egl_is_there(), v4l2_is_there(), name)
+            for name, source, device in cameras
             if needs.role == "slave"
-            else []
         ),
     ]
 

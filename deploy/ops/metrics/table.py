@@ -13,7 +13,7 @@ from enum import StrEnum
 from common.clock import to_s
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary
-from common.metrics.slave import SlaveMetrics
+from common.metrics.slave import CameraMetrics, SlaveMetrics
 
 GUARD_STATES = ("boot", "hold", "align", "track", "clutch", "estop")
 FRESH_S = 5.0
@@ -102,6 +102,12 @@ def _each(label: str, values: Mapping[str, float | Summary]) -> Iterable[ServedS
     return [ServedSample(value, {label: name}) for name, value in values.items()]
 
 
+def _cameras(metrics: SlaveMetrics) -> Mapping[str, CameraMetrics]:
+    """By name; the main one's is empty, which Prometheus takes for no label: as where it is the only one."""
+    main = {} if metrics.video is None else {"": metrics.video}
+    return {**main, **metrics.other_videos}
+
+
 def _stages(metrics: MasterMetrics | SlaveMetrics) -> Iterable[ServedSample]:
     stages = dict(metrics.stages_ms)
     if isinstance(metrics, SlaveMetrics):
@@ -176,12 +182,14 @@ TABLE: tuple[ServedMetric, ...] = (
         _slave(lambda m: _each("event", dict(m.servos.counters))), ("event",),
     ),
     ServedMetric(
-        "tandem_video_pictures_per_second", _G, "Pictures that the robot's camera sends.",
-        _slave(lambda m: _one(None if m.video is None else m.video.fps)), (), "fps", "{name}",
+        "tandem_video_pictures_per_second", _G, "Pictures that a camera of the robot sends.",
+        _slave(lambda m: _each("camera", {name: one.fps for name, one in _cameras(m).items()})),
+        ("camera",), "fps", "{name}",
     ),
     ServedMetric(
-        "tandem_video_failed", _G, "1 while the robot's camera gives no picture.",
-        _slave(lambda m: _one(None if m.video is None else float(bool(m.video.fault)))), (), "bool_yes_no",
+        "tandem_video_failed", _G, "1 while a camera of the robot gives no picture.",
+        _slave(lambda m: _each("camera", {n: float(bool(one.fault)) for n, one in _cameras(m).items()})),
+        ("camera",), "bool_yes_no",
     ),
     ServedMetric(
         "tandem_robot_silent", _G, "1 while the master does not hear the robot.",

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from common.errors import TandemError
+from common.errors import ConfigError, TandemError
 
 _WIDTH = 120
 """Of the table of joints, which a narrower terminal wraps."""
@@ -41,7 +41,7 @@ def import_(
     """
     from common.skeleton.load import OWN_FILE, load_skeleton
     from deploy.ops.profile.compiled import compiled
-    from deploy.ops.profile.guess import guess
+    from deploy.ops.profile.guess import guess, shared_hinges
     from deploy.ops.profile.write import write_robot
     from deploy.ops.profile.zero_pose import zero_pose
 
@@ -54,6 +54,9 @@ def import_(
             f"{model}: no arm found (three turning joints in a row, not named after a leg, head or finger): "
             "write the profile by hand, see docs/extending.md"
         )
+    mistakes = shared_hinges(read, guessed)
+    if mistakes:
+        raise ConfigError(model, mistakes)
     place, off = zero_pose(read.model, guessed)
     guesses = write_robot(read, guessed, place, out)
     skeleton = load_skeleton(str(out))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import mujoco
 
+from common.errors import ConfigMistake
 from deploy.ops.profile.compiled import Compiled
 
 _WORDS = {
@@ -61,6 +62,20 @@ def guess(read: Compiled) -> Guess:
             why = {"leg": "tandem drives upper bodies", "grip": "the hand's closing moves others already"}
             found.left_out[name] = why.get(kind, "no segment of the operator moves it") + ": rigid at 0"
     return found
+
+
+def shared_hinges(read: Compiled, found: Guess) -> list[ConfigMistake]:
+    """Joints that follow another one, and turn a segment by themselves too: two would drive one hinge."""
+    expected = (
+        "a joint that turns by itself, as trunk, arm and head need. Take the mimic (MJCF: the equality) out "
+        "of the file if the joint has its own motor; if it has none, make it fixed"
+    )
+    return [
+        ConfigMistake(f"joint.{name}.mimic", f"{read.follows[name][0]}, and it turns the {segment}", expected)
+        for segment, group in found.groups.items()
+        for name in (read.model.joint(j).name for j in group)
+        if name in read.follows
+    ]
 
 
 def _guess_trunk(read: Compiled, trunk: int, found: Guess) -> None:

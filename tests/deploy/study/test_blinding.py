@@ -19,6 +19,7 @@ from common.link.endpoint import TRANSPORTS
 from common.recording import RecordingStream
 from deploy import cli
 from deploy.console.study import StudyDesk
+from deploy.examples.profiles import example
 from deploy.experiments.trial.cell.folder import Folder
 from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 from deploy.experiments.trial.cell.result import Cell, CellStatus
@@ -179,6 +180,16 @@ def test_the_master_of_a_condition_connects_by_the_key_and_its_log_does_not_say_
     assert HidingFormatter(logging.Formatter()).format(record) == f"no router at {HIDDEN}, {HIDDEN}"
     with pytest.raises(TandemError, match=r"cannot be opened: \(hidden\)"), transports_hidden():
         raise LinkError("the link cannot be opened: tcp/192.0.2.9:7447")
+
+
+def test_a_blinded_master_takes_no_second_path(drawn: tuple[Path, str], tmp_path: Path) -> None:
+    """It would run beside the condition's, and the metrics name the path that is missing by its endpoints."""
+    file = tmp_path / "master.toml"
+    shipped = example("master").read_text("utf-8")
+    file.write_text(f'{shipped}\n[link.twin]\nconnect = ["tcp/192.0.2.8:7447"]\n', "utf-8")
+    code = read_key(drawn[0]).codes[0]
+    with pytest.raises(TandemError, match=r"link\.twin.*take \[link\.twin\] out"):
+        tandem("master", file, "--blinded", drawn[0], "--condition", code)
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,9 @@ def test_a_table_is_one_camera_and_a_list_up_to_three() -> None:
     for wrong, named in (
         (listed.replace("hand", "head"), "camera.name"),
         (listed.replace('"robot"', '"v4l2"'), "camera.device"),
-        (listed * 2, "camera.others"),
+        (listed * 2, "camera = .*at most 3 cameras, not 4"),
+        (f"{listed}colour = 3\n", r"camera\.1\.colour = 3"),
+        (f"[[camera]]\nwidth = 81\n{hand}", r"camera\.0\.width = 81"),
     ):
         with pytest.raises(ConfigError, match=named):
             slave(wrong)

@@ -7,6 +7,7 @@ computed from the cells' files, which proves less: what a cell says is then take
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +22,12 @@ from deploy.experiments.trial.cell.tape import RECORDINGS, recording_of
 from deploy.experiments.trial.report.document import as_html
 from deploy.experiments.trial.report.findings import Findings, find
 from deploy.experiments.trial.report.machine import as_csv, tree
+from deploy.experiments.trial.report.plots import plots
 from deploy.experiments.trial.report.tasks import TASKS
 from deploy.experiments.trial.report.write import CSV, HTML, JSON, TASKS_COPY
 
-_PLOTS = ("<h2>Plots</h2>", "<h2>Values</h2>")
-"""Where the page's plots begin and end: other versions of their library draw a curve in other bytes."""
+_IMAGE = re.compile(r'src="data:image/[^"]*"')
+"""A plot: other versions of its library draw a curve in other bytes. Its title and caption are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,7 @@ def _tables_apart(folder: Path, findings: Findings, given: str) -> list[str]:
         raise TandemError(f"{folder}: there is no report that can be read ({error})") from None
     again = as_csv(cell for row in findings.rows for cell in row.cells)
     computed = json.loads(json.dumps(tree(findings, {})["compared"]))
-    tables = as_html(findings, [], about)
+    tables = as_html(findings, plots(findings.rows), about)
     return [
         *_lines_apart(CSV, table, again, given),
         *(f"{JSON}: {path} is not what the {given}" for path in _apart(compared, computed, "compared")),
@@ -112,17 +114,13 @@ def _tables_apart(folder: Path, findings: Findings, given: str) -> list[str]:
     ]
 
 
-def _without_plots(text: str) -> Iterator[tuple[int, str]]:
-    """The lines with their numbers, less empty ones and those of the plots."""
-    drawn = False
-    for number, line in enumerate(text.splitlines(), start=1):
-        drawn = line == _PLOTS[0] or (drawn and line != _PLOTS[1])
-        if line and not drawn:
-            yield number, line
+def _without_images(text: str) -> list[tuple[int, str]]:
+    """The lines with their numbers, less empty ones, and less what plots are drawn of."""
+    return [(n, _IMAGE.sub("", line)) for n, line in enumerate(text.splitlines(), start=1) if line]
 
 
 def _lines_apart(name: str, old: str, new: str, given: str) -> Iterator[str]:
-    lines, again = list(_without_plots(old)), list(_without_plots(new))
+    lines, again = _without_images(old), _without_images(new)
     for (number, line), (_, other) in zip(lines, again, strict=False):
         if line != other:
             yield f"{name}: line {number} is not what the {given}"

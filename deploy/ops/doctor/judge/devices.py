@@ -44,9 +44,9 @@ def judge_latency(pinged: Pinged, reply_timeout_s: float) -> Finding:
     return ok(check, words)
 
 
-def judge_camera(source: CameraNeed, device: Device, egl: bool, v4l2: bool) -> Finding:
-    """A robot runs without its camera, so none of this is fatal."""
-    check = "camera"
+def judge_camera(source: CameraNeed, device: Device, egl: bool, v4l2: bool, name: str = "") -> Finding:
+    """A robot runs without its camera, so none of this is fatal. `name`: of one beside the main one."""
+    check = f"camera {name}".rstrip()
     match source:
         case CameraNeed.OFF:
             return ok(check, "off")

@@ -70,6 +70,8 @@ class Needs:
     """Joints without a servo, in words."""
     camera: CameraNeed = CameraNeed.OFF
     camera_device: str = ""
+    other_cameras: tuple[tuple[str, CameraNeed, str], ...] = ()
+    """Name, source and device of those beside it."""
     link: LinkConfig = field(default_factory=LinkConfig)
     clock: ClockConfig | None = None
     estop: EstopConfig | None = None
@@ -146,6 +148,7 @@ def _of_slave(config: SlaveConfig) -> Needs:
         not_driven=config.servos.not_driven(skeleton),
         camera=CameraNeed(config.camera.source),
         camera_device=config.camera.device,
+        other_cameras=tuple((one.name, CameraNeed(one.source), one.device) for one in config.camera.others),
         link=config.link,
         clock=config.clock,
         certified_as=common_name(Role.ROBOT, config.robot),

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from common.errors import ConfigError, TandemError
 from deploy import cli
-from deploy.ops.doctor.examine import Options, examine
+from deploy.ops.doctor.examine import Options, devices, examine
 from deploy.ops.doctor.judge.finding import Health, fail, ok, warn, worst
 from deploy.ops.doctor.judge.needs import CameraNeed, Needs, needs_of
 from deploy.ops.doctor.read.tree import Tree
@@ -51,6 +51,15 @@ def test_a_slave_s_file_tells_its_ports_and_camera() -> None:
     assert needs.buses == ()
     drives = needs_of(EXAMPLES / "slave.toml", ['servos.backend="canopen"'])
     assert [need.bus.name for need in drives.buses] == ["left", "right"]
+
+
+def test_each_camera_of_a_slave_s_file_is_looked_at(tmp_path: Path) -> None:
+    beside = '[[camera]]\nsource = "v4l2"\nname = "room"\ndevice = "/dev/video7"\n'
+    text = (EXAMPLES / "slave.toml").read_text("utf-8").replace("[camera]", "[[camera]]")
+    (tmp_path / "slave.toml").write_text(f"{text}\n{beside}", "utf-8")
+    found = devices(needs_of(tmp_path / "slave.toml"), Tree(tmp_path))
+    assert [one.check for one in found if one.check.startswith("camera")] == ["camera", "camera room"]
+    assert found[-1].health is not Health.OK
 
 
 def test_a_suit_s_file_is_known_too() -> None:

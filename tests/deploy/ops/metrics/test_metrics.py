@@ -21,7 +21,7 @@ from common.link.config import LinkConfig
 from common.metrics.bus import BusMetrics
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary
-from common.metrics.slave import OffsetMetrics, SlaveMetrics
+from common.metrics.slave import CameraMetrics, OffsetMetrics, SlaveMetrics
 from common.wire.codec import encode
 from common.wire.messages import Statistics
 from common.wire.topics import STATISTICS
@@ -95,6 +95,17 @@ def test_values_and_units_are_what_the_processes_published(collector: Statistics
     assert scraped.value("tandem_node_doubted", node="left_hand") == 1
     assert scraped.value("tandem_bus_up", bus="suit") == 1
     assert scraped.value(UP, role="master") == 1
+
+
+def test_each_camera_of_a_robot_is_served() -> None:
+    good = CameraMetrics(1, 12.0, 3.0, 4.0, 5, 6.0, 7, 8, 9, Summary(0), Summary(0), Summary(0), "")
+    made = StatisticsCollector(clock=lambda: 10 * NS_PER_S)
+    told = slave_metrics(video=good, other_videos={"room": replace(good, fps=0.0, fault="unplugged")})
+    made.take(ROBOT, encode(Statistics(1, told)), 9 * NS_PER_S)
+    scraped = Scraped(made)
+    assert scraped.value("tandem_video_pictures_per_second", camera="") == 12.0
+    assert scraped.value("tandem_video_failed", camera="") == 0.0
+    assert scraped.value("tandem_video_failed", camera="room") == 1.0
 
 
 def test_a_process_that_fell_silent_has_no_values_but_that(collector: StatisticsCollector) -> None:

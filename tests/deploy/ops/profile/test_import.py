@@ -251,6 +251,25 @@ def test_a_mimic_joint_is_moved_with_the_one_it_follows(tmp_path: Path) -> None:
     assert read.follows["left_jaw_joint2"] == ("left_jaw_joint1", 1.0)
 
 
+def test_a_trunk_joint_that_follows_another_one_is_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
+    file, out = tmp_path / "robot.urdf", tmp_path / "own"
+    robot = ET.fromstring(URDF)
+    roll = robot.find("joint[@name='waist_roll_joint']")
+    assert roll is not None
+    ET.SubElement(roll, "mimic", joint="waist_pitch_joint", multiplier="0.5")
+    file.write_text(ET.tostring(robot, encoding="unicode"), "utf-8")
+    done = CliRunner().invoke(app, ["profile", "import", str(file), "--out", str(out)])
+    assert isinstance(done.exception, ConfigError)
+    (line,) = str(done.exception).splitlines()
+    assert re.search(
+        r"robot\.urdf: joint\.waist_roll_joint\.mimic = .*waist_pitch_joint.*turns the chest", line
+    )
+    assert "make it fixed" in line
+    assert not out.exists()
+
+
 def one_arm(file: Path, hand: bool) -> Path:
     """The right arm alone, with its gripper or without."""
     robot = ET.fromstring(MJCF)

@@ -78,6 +78,16 @@ def test_a_changed_line_of_the_page_is_named_and_another_drawing_of_a_plot_is_no
     assert differences(Folder(copy)).differences == []
 
 
+def test_a_table_among_the_plots_is_named(copy: Path) -> None:
+    page = copy / "report.html"
+    old = page.read_text("utf-8")
+    page.write_text(old.replace("<h2>Plots</h2>", "<h2>Plots</h2>\n<table><td>0.01</table>"), "utf-8")
+    found = differences(Folder(copy)).differences
+    assert any("report.html: line" in words for words in found), found
+    page.write_text(old.replace("<figcaption><b>", "<figcaption><b>No "), "utf-8")
+    assert differences(Folder(copy)).differences
+
+
 def test_the_ranking_uses_the_weights_that_lie_in_the_folder(copy: Path) -> None:
     tasks = copy / "tasks.toml"
     tasks.write_text(tasks.read_text("utf-8").replace("weight = ", "weight = 1", 1), "utf-8")
