@@ -79,7 +79,9 @@ class Hub:
     @property
     def engaged_robots(self) -> list[str]:
         """Robots that follow an operator or move to their posture, as far as was heard."""
-        return [robot for robot, model in self.models.items() if model.guard in ENGAGED]
+        heard = [robot for robot, model in self.models.items() if model.guard in ENGAGED]
+        listed = [] if self.opened is None else self.opened.engaged(monotonic_ns())
+        return list(dict.fromkeys([*heard, *listed]))
 
     def calibrates(self, desk: CalibrationDesk) -> None:
         """Show what this desk shows."""
@@ -199,7 +201,8 @@ class Hub:
                 await self._list_robots(now_ns)
             self._watch_pages(now_ns)
             self._watch_deadman(now_ns)
-            self.calibration.watch(self.engaged_robots)
+            if self.calibration.under_way:
+                self.calibration.watch(self.engaged_robots)
             for page in self.pages:
                 page.tell_stop(now_ns)
 

@@ -14,6 +14,7 @@ from common.link import LinkSession
 from common.link.roster import Roster
 from deploy.client.roster_view import RosterRows, roster_rows
 from deploy.console.hearing import Hearing
+from deploy.console.model.guard_table import ENGAGED
 from deploy.console.model.robot import RobotModel
 from deploy.console.stopping import RobotStopper
 
@@ -36,14 +37,19 @@ class OpenedRobots:
         *,
         session: LinkSession,
         profile: str,
+        operator: str,
         make: Callable[[str], tuple[RobotModel, RobotStopper]],
     ) -> None:
-        """`make`: a robot's model and stopper. `profile`: of the robots that this console can draw."""
+        """`make`: a robot's model and stopper. `profile`: of the robots that this console can draw.
+
+        `operator`: whose console this is.
+        """
         self._roster = roster
         self._hearing = hearing
         self._stoppers = stoppers
         self._session = session
         self._profile = profile
+        self._operator = operator
         self._make = make
         self.on_close: Callable[[str], None] = lambda robot: None
         """Called before a robot's link is withdrawn."""
@@ -53,6 +59,15 @@ class OpenedRobots:
     def rows(self, now_ns: int) -> RosterRows:
         """The list."""
         return roster_rows(self._roster, now_ns)
+
+    def engaged(self, now_ns: int) -> list[str]:
+        """Robots of the list that follow this console's operator, whether a page shows them or not."""
+        fresh = [(listed.robot, listed.fresh(now_ns)) for listed in self._roster.robots()]
+        return [
+            robot
+            for robot, summary in fresh
+            if summary is not None and summary.operator == self._operator and summary.guard in ENGAGED
+        ]
 
     def lists(self, robot: str) -> bool:
         """Whether a robot of that name is there."""

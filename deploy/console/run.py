@@ -110,8 +110,9 @@ async def _run(options: ConsoleOptions, door: _Door) -> None:
         roster = Roster()
         session.watch_roster(roster)
         opened = OpenedRobots(
-            roster, hearing, stoppers, session=session, profile=options.skeleton.name, make=make
-        )
+            roster, hearing, stoppers,
+            session=session, profile=options.skeleton.name, operator=where.operator, make=make,
+        )  # fmt: skip
         if not models:
             await _first(opened)
         relay = DeadmanRelay(options.deadman_socket) if options.deadman_socket else None

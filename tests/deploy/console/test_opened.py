@@ -44,6 +44,7 @@ class Desk:
     """Of the robots."""
     wanted: list[bool]
     """Whether the home's robot had somebody who heard its states, each time that changed."""
+    roster: Roster
 
 
 @asynccontextmanager
@@ -60,11 +61,14 @@ async def desk(profile: str = "nursing", robots: int = 1) -> AsyncIterator[Desk]
             model = RobotModel(robot, SKELETON, Whose("nurse-1", Side.ELSEWHERE))
             return model, RobotStopper(session.link(robot), model, "nurse-1")
 
-        opened = OpenedRobots(roster, hearing, stoppers, session=session, profile=SKELETON.name, make=make)
+        opened = OpenedRobots(
+            roster, hearing, stoppers,
+            session=session, profile=SKELETON.name, operator="nurse-1", make=make,
+        )  # fmt: skip
         wanted: list[bool] = []
         announce(home, robots, profile, wanted)
         await until(lambda: len(opened.rows(monotonic_ns()).robots) == robots)
-        yield Desk(opened, hearing, stoppers, home, wanted)
+        yield Desk(opened, hearing, stoppers, home, wanted, roster)
 
 
 def announce(home: LinkSession, robots: int, profile: str, wanted: list[bool]) -> None:
@@ -129,6 +133,30 @@ def test_the_list_shows_who_waits_first() -> None:
         summary = RobotSummary(name, 1 + number, 1, "hold", "", call=call)
         roster.on_summary(SUMMARY.key_for(name), encode_summary(summary), S)
     assert [row.robot for row in roster_rows(roster, S).robots] == ["c", "b", "a"]
+
+
+def test_a_robot_that_follows_its_operator_is_known_though_no_page_shows_it() -> None:
+    """Else the suit could be calibrated while a robot of `robots = "*"` follows it."""
+
+    async def story() -> None:
+        async with desk() as one:
+            hub = Hub(
+                one.hearing.models,
+                Access([], secure=False, stranger=PageRole.NOBODY),
+                one.stoppers,
+                opened=one.opened,
+            )
+
+            def tells(sequence: int, guard: str, operator: str) -> list[str]:
+                told = encode_summary(RobotSummary("ward-0", 1, sequence, guard, "", operator))
+                one.roster.on_summary(SUMMARY.key_for("ward-0"), told, monotonic_ns())
+                return hub.engaged_robots
+
+            assert tells(1, "hold", "nurse-1") == []
+            assert tells(2, "track", "nurse-1") == ["ward-0"]
+            assert tells(3, "track", "nurse-2") == [], "it follows another one's suit"
+
+    asyncio.run(story())
 
 
 def test_a_listed_robot_may_be_taken_and_given_back_and_nothing_else() -> None:
