@@ -51,6 +51,12 @@ class Folder:
                 cell = Cell.of_tree(_read(file))
             except TandemError as error:
                 raise TandemError(f"{file}: {error}; remove it to run the cell again") from None
+            if (
+                file.stem != cell.key.slug
+            ):  # else one of two files of a cell would be judged, and the other shown
+                raise TandemError(
+                    f"{file}: it holds the cell {cell.key.slug}; remove it, or give it that name"
+                )
             found[cell.key] = cell
         return found
 

@@ -60,6 +60,14 @@ def test_a_sealed_trial_with_a_changed_cell_is_refused(copy: Path) -> None:
     assert f"cells/{cell.name}" in result.output
 
 
+def test_a_cell_beside_its_copy_under_another_name_is_named(copy: Path) -> None:
+    """Else a changed cell would not be seen, as its unchanged copy is what is judged."""
+    cell = sorted((copy / "cells").glob("*.json"))[0]
+    shutil.copy(cell, cell.with_name("~.json"))
+    with pytest.raises(TandemError, match=rf"~\.json: it holds the cell {cell.stem}"):
+        differences(Folder(copy))
+
+
 def test_a_folder_without_a_report_says_so(copy: Path) -> None:
     (copy / "report.json").unlink()
     with pytest.raises(TandemError, match="no report that can be read"):
