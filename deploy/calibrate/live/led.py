@@ -139,6 +139,19 @@ def _tell(message: Mapping[str, object]) -> None:
     sys.stdout.flush()
 
 
+async def whole_in_thread(call: Callable[[], bool]) -> bool:
+    """What `call` returns, from a thread.
+
+    A cancelled caller still waits for its end: it may open a recording that nobody would then close.
+    """
+    running = asyncio.ensure_future(asyncio.to_thread(call))
+    try:
+        return await asyncio.shield(running)
+    except asyncio.CancelledError:
+        await running
+        raise
+
+
 async def _lead(order: LedOrder, words: asyncio.StreamReader) -> None:
     config = load_config(Path(order.master), MasterConfig, order.overrides)
     make_folder(Path(order.out))
@@ -156,7 +169,7 @@ async def _lead(order: LedOrder, words: asyncio.StreamReader) -> None:
         nonlocal done
         while not done:
             await asyncio.sleep(SHOW_S)
-            done = await asyncio.to_thread(session.show)
+            done = await whole_in_thread(session.show)
         stop.set()
 
     async def work() -> None:
