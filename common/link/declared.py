@@ -5,11 +5,14 @@ from __future__ import annotations
 import itertools
 import logging
 from collections.abc import Callable
+from typing import TypeVar
 
 import zenoh
 
 Declare = Callable[[zenoh.Session], object]
 """Declares something in a session and returns what keeps it declared."""
+
+Event = TypeVar("Event")
 
 log = logging.getLogger(__name__)
 
@@ -34,6 +37,19 @@ class Declarations:
         """Declare it no more: the other sides need not send what nobody hears."""
         self._makers.pop(number, None)
         _undeclare(self._held.pop(number, None))
+
+    def only_of(self, session: zenoh.Session, on_event: Callable[[Event], object]) -> Callable[[Event], None]:
+        """`on_event` as long as that session is in use; what it tells later is dropped.
+
+        A session that does not close in time is left to itself. Who then goes in it has not gone in the new
+        one, and would not come again there.
+        """
+
+        def heard(event: Event) -> None:
+            if self.session is session:
+                on_event(event)
+
+        return heard
 
     def move(self, session: zenoh.Session) -> None:
         """Declare everything in another session; the old one is closed already."""

@@ -124,7 +124,8 @@ class LinkSession:
                 for name in of_links:
                     wake(self._loop, on_change, session_id, name, False)
             names.clear()
-            return session.info.declare_link_events_listener(Callback(on_event, indirect=False), history=True)
+            on_this = self._declared.only_of(session, on_event)
+            return session.info.declare_link_events_listener(Callback(on_this, indirect=False), history=True)
 
         self._declared.add(declare)
 

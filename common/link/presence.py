@@ -87,8 +87,7 @@ def _watch(
         for presence in list(here.values()):
             wake(loop, on_change, presence, False)
         here.clear()
-        return session.liveliness().declare_subscriber(
-            keys, Callback(on_sample, indirect=False), history=True
-        )
+        on_this = declared.only_of(session, on_sample)
+        return session.liveliness().declare_subscriber(keys, Callback(on_this, indirect=False), history=True)
 
     return declared.add(declare)

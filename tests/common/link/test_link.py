@@ -17,8 +17,11 @@ from common.clock import monotonic_ns
 from common.errors import LinkError, LinkTimeoutError
 from common.link import Link, LinkSession, open_link, open_session
 from common.link.config import LinkConfig, TopicConfig
+from common.link.declared import Declarations
+from common.link.presence import watch_presence
 from common.link.queries import MAX_WAITING, Answerer
 from common.metrics.link import TopicCounters
+from common.wire.presence import ProcessPresence
 from common.wire.stop import pack_stop
 from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, Priority
 
@@ -553,3 +556,46 @@ def test_who_goes_is_named_as_he_came_and_forgotten_then() -> None:
         ("a", anna, True), ("a", anna, True), ("b", "", True),
         ("a", anna, False), ("b", "", False), ("a", anna, False), ("a", "", False),
     ]  # fmt: skip
+
+
+class Tokens:
+    """Stands for Zenoh's session as far as it tells of liveliness tokens."""
+
+    def liveliness(self) -> Any:
+        return self
+
+    def declare_subscriber(self, keys: str, handler: Any, history: bool) -> object:
+        self.handler = handler.callback
+        return history
+
+    def tell(self, key: str, here: bool) -> None:
+        kind = zenoh.SampleKind.PUT if here else zenoh.SampleKind.DELETE
+        self.handler(SimpleNamespace(kind=kind, key_expr=key))
+
+
+def test_who_goes_in_a_session_that_was_replaced_has_not_gone_in_the_new_one() -> None:
+    """One that leads nowhere closes long after another is in use; nobody would come a second time in that."""
+    linked: list[bool] = []
+    shown: list[bool] = []
+
+    async def test() -> None:
+        loop = asyncio.get_running_loop()
+        before, after = Links(), Links()
+        session = LinkSession(before, loop)  # type: ignore[arg-type]
+        session.watch_peers(lambda *change: linked.append(change[2]))
+        session._declared.move(after)  # type: ignore[arg-type]
+        after.tell("router", True)
+        before.tell("router", False)
+
+        old, new = Tokens(), Tokens()
+        of_tokens, key = Declarations(old), ProcessPresence(ROBOT, "slave", 7, 6).key  # type: ignore[arg-type]
+        watch_presence(of_tokens, loop, ROBOT, lambda _, here: shown.append(here))
+        of_tokens.move(new)  # type: ignore[arg-type]
+        new.tell(key, True)
+        old.tell(key, False)
+        new.tell(key, False)
+        await until(lambda: len(shown) == 2)
+
+    run(test)
+    assert linked == [True]
+    assert shown == [True, False]
