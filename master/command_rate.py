@@ -1,7 +1,8 @@
 """How many commands a second the master sends: fixed by its file, or as the robots' lines allow. Pure.
 
-The same joint angles go to every robot, so the slowest line decides. A robot that is not heard, or whose
-lease another holds, does not; without any robot it is the usual rate.
+The same joint angles go to every robot, so the slowest line decides, and one that has fallen silent counts
+as slow. A robot that was never heard, or whose lease another holds, does not decide; without any robot it is
+the usual rate.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ class Fleet:
 
     @property
     def wanted_ms(self) -> dict[str, int]:
-        """By robot that obeys this operator, the period between two commands that it asks for."""
+        """By robot that obeys this operator, the period between two commands that it asks for; 0: none."""
         wanted = {robot.name: robot.wanted_period_ms for robot in self._commanded}
         return {name: period_ms for name, period_ms in wanted.items() if period_ms is not None}
 

@@ -222,12 +222,13 @@ class CommandedRobot:
     def wanted_period_ms(self) -> int | None:
         """What the robot's line lets it ask for between two commands, 0: it does not say.
 
-        None while it is not heard, or does not obey this operator: then it has no say in the rate.
+        None where it does not obey this operator: then it has no say in the rate. One that obeyed and is
+        silent asks for nothing any more: what its line carries is not known, and it may hear still.
         """
         state = self._watch.state
-        if state is None or not self._lease.holds(state) or self._watch.silent(monotonic_ns()):
+        if state is None or not self._lease.holds(state):
             return None
-        return state.wanted_period_ms
+        return 0 if self._watch.silent(monotonic_ns()) else state.wanted_period_ms
 
     @property
     def sign(self) -> RobotSign:

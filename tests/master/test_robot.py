@@ -12,7 +12,7 @@ import msgpack
 import numpy as np
 import pytest
 
-from common.clock import monotonic_ns
+from common.clock import monotonic_ns, to_ns
 from common.config.load import load_config
 from common.metrics.master import MasterMetrics
 from common.wire.codec import VERSION, decode, encode
@@ -86,11 +86,18 @@ class FakeLink:
         self.asked.append(decode(payload, ControlRequest).action)
         return encode(ControlReply(True, "hold", "yours", self.token, instance=self.instance)), 0
 
-    def state(self, now_ns: int, token: int = 0, echo: CommandEcho | None = None, instance: int = 1) -> None:
+    def state(
+        self,
+        now_ns: int,
+        token: int = 0,
+        echo: CommandEcho | None = None,
+        instance: int = 1,
+        wanted_ms: int = 0,
+    ) -> None:
         zeros, valid = np.zeros(JOINTS), np.ones(JOINTS, np.bool_)
         state = RobotState(
             "r", 1, now_ns, now_ns, "hold", "", "nurse-1" if token else "", valid, zeros, zeros, echo, 0, 1,
-            lease_id=lease_id(token), instance=instance,
+            lease_id=lease_id(token), instance=instance, wanted_period_ms=wanted_ms,
         )  # fmt: skip
         self.hear[STATE.name](encode(state), now_ns)
 
@@ -256,3 +263,18 @@ def test_the_clock_of_a_robot_that_stands_is_asked_at_half_the_rate_once_it_is_k
     assert all(asks_clock(turn, moves=True) for turn in later)
     # the robot takes another asker after a second of silence
     assert all(any(asks_clock(turn + i, moves=False) for i in range(2)) for turn in later)
+
+
+def test_a_robot_that_obeyed_and_fell_silent_is_sent_no_more_than_the_usual_rate() -> None:
+    """Its line had an outage, and gets no four times as many commands as the others' lines are quick."""
+    now_ns, links = monotonic_ns(), {"lan": FakeLink(), "rough": FakeLink(), "never": FakeLink()}
+    fleet = master_of(**links)._fleet
+    for robot in fleet:
+        robot._lease.token, robot._lease.instance = 7, 1
+    links["lan"].state(now_ns + to_ns(60.0), 7, wanted_ms=20)
+    links["rough"].state(now_ns + to_ns(60.0), 7, wanted_ms=80)
+    assert fleet.wanted_ms == {"lan": 20, "rough": 80}
+    links["rough"].state(now_ns - to_ns(60.0), 7, wanted_ms=20)
+    assert fleet.wanted_ms == {"lan": 20, "rough": 0}
+    links["rough"].state(now_ns + to_ns(60.0), 8, wanted_ms=20)
+    assert fleet.wanted_ms == {"lan": 20}, "another holds its lease"
