@@ -163,8 +163,8 @@ class RobotAhead:
                 self._targets.add(at_ns, target.position_rad)
 
     def _judge(self, state: RobotState, read_ns: int) -> None:
-        foretold = list(self._foretold)
-        i = bisect_right([each.at_ns for each in foretold], read_ns)
+        foretold = self._foretold
+        i = bisect_right(foretold, read_ns, key=lambda each: each.at_ns)
         if not 0 < i < len(foretold):
             return
         before, after = foretold[i - 1], foretold[i]
