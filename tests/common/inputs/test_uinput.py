@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
 import subprocess
 from collections.abc import Callable
 
@@ -24,7 +25,8 @@ LIMIT_S = 30.0
 @pytest.fixture(autouse=True)
 def kernel_has_uinput() -> None:
     for module in ("evdev", "uinput"):  # built in, loaded or to be loaded
-        subprocess.run(["modprobe", "-q", module], check=False, stderr=subprocess.DEVNULL)
+        if shutil.which("modprobe"):
+            subprocess.run(["modprobe", "-q", module], check=False, stderr=subprocess.DEVNULL)
     if not os.access("/dev/uinput", os.W_OK):
         pytest.skip("this kernel has no uinput")
 
