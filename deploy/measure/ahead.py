@@ -96,6 +96,11 @@ class RobotAhead:
         self._scored = _Scored()
         self._scored_ns = 0
 
+    @property
+    def way_ns(self) -> int | None:
+        """How long commands take to the robot, by the newest state; None where that is not known."""
+        return self._way_ns
+
     def on_command(self, command: Command) -> None:
         """A command was put on the link."""
         self._sent.append(command)

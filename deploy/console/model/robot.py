@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from common.clock import NS_PER_S, to_ns, to_s
+from common.clock import NS_PER_MS, NS_PER_S, to_ns, to_s
 from common.clock_sync import Offset
 from common.latency.one_way import master_offset
 from common.metrics.master import MasterMetrics
@@ -31,6 +31,9 @@ SILENT_S = 0.5
 """Without a state for so long this console does not know what the robot does."""
 COMMAND_SILENT_S = 1.0
 LATENESS_SILENT_NS = 2 * NS_PER_S
+FORETOLD_FROM_NS = 20 * NS_PER_MS
+"""One way. On a quicker line the state is hardly older than the page's own pictures of it, and foretelling it
+is a third of the console's work."""
 CAMERA = "head"
 TAP, LINK = "tap", "link"
 """Whence a state came: from the master on this host, or from the robot itself."""
@@ -230,7 +233,10 @@ class RobotModel:
 
     def _ahead(self, now_ns: int) -> dict[str, object] | None:
         """Where the robot is by now; None where it cannot be foretold."""
-        if not self._foretells or self.silent(now_ns) or not self.master_heard(now_ns):
+        way_ns = self.ahead.way_ns
+        if not self._foretells or way_ns is None or way_ns < FORETOLD_FROM_NS:
+            return None
+        if self.silent(now_ns) or not self.master_heard(now_ns):
             return None
         found = self.ahead.foretell(now_ns)
         if found is None:

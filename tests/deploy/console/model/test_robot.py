@@ -17,6 +17,7 @@ from common.wire.video import VideoFrame
 from deploy.console.model.robot import LINK, SILENT_S, TAP, RobotModel, Side
 from deploy.console.model.stopped import CONFIRM_S
 from deploy.console.viewers import pack
+from deploy.measure.ahead import Foretold, RobotAhead
 from tests.deploy.console.robots import (
     BOUND_NS,
     JPEG,
@@ -405,3 +406,16 @@ def test_the_robots_own_console_needs_no_offset() -> None:
     offset = robot.offset(to_ns(1.0))
     assert offset is not None
     assert offset.offset_ns == 0
+
+
+@pytest.mark.parametrize(("way_ms", "foretold"), [(19.9, False), (20.0, True)])
+def test_the_robot_is_foretold_on_a_long_line_only(
+    way_ms: float, foretold: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = heard()
+    robot.on_command(command(1, 0.9, 0.95), to_ns(1.0))
+    found = Foretold(to_ns(1.0), np.zeros(J), np.zeros(J), np.zeros(J), to_ns(0.03))
+    monkeypatch.setattr(RobotAhead, "way_ns", property(lambda _: to_ns(way_ms / 1e3)))
+    monkeypatch.setattr(RobotAhead, "foretell", lambda _, now_ns: found)
+    shown = view(robot, 1.0)["ahead"]
+    assert (shown is not None) is foretold
