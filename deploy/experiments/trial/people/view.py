@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
+from rich.table import Table
 
 from common.skeleton import Skeleton
 from deploy.experiments.trial.people.study import RATES_HZ, SLOWER, Row, rows, running, verdicts
@@ -29,21 +30,9 @@ def run_people_trial(
         f"{len(clips)} clips, {seconds:.0f} s, of {who} ({people.who}); virtual clock, servo of 8 Hz"
     )
     speeds = SLOWER if slower is None else (slower,)
-    table = plain_table(
-        "line", "Hz", "strategy", "/ latest", "no limits", "RMSE °", "rough", "over °", "most °", "still °"
-    )
-    done: list[Row] = []
-    for row in rows(clips, skeleton, strategies, speeds, seed):
-        done.append(row)
-        f, line = row.found, row.line
-        poor = f", {100 * line.loss:g} % lost, jitter" if line.loss else ""
-        table.add_row(
-            f"1 / {row.slower:g}, {1e3 * line.one_way_s:.0f} ms{poor}", f"{line.rate_hz:g}", row.strategy,
-            f"{row.over_latest:.2f}", f"{row.unlimited_over_latest:.2f}",
-            f"{f.rmse_deg:.2f}", f"{f.roughness:.2f}", f"{f.overshoot_deg:.1f}",
-            f"{f.largest_overshoot_deg:.0f}", f"{f.still_deg:.2f}",
-        )  # fmt: skip
-    console.print(table)
+    done = list(rows(clips, skeleton, strategies, speeds, seed))
+    for title in dict.fromkeys(map(_line, done)):
+        console.print(_table(title, [row for row in done if _line(row) == title]))
     runners = running(clips)
     ran = [*rows(runners, skeleton, ("latest", "predict"), (1.0,), seed)] if runners else []
     judged = verdicts(done, _running_ratio(ran))
@@ -55,6 +44,29 @@ def run_people_trial(
     (folder / FILE).write_text(json.dumps(tree, indent=1), "utf-8")
     console.print(f"report: {folder / FILE}", highlight=False, soft_wrap=True)
     return judged
+
+
+def _line(row: Row) -> str:
+    poor = f", {100 * row.line.loss:g} % lost, jitter" if row.line.loss else ""
+    speed = "natural speed" if row.slower == 1.0 else f"{row.slower:g} × slower"
+    return f"{speed}, {1e3 * row.line.one_way_s:.0f} ms one way{poor}"
+
+
+def _table(title: str, of_line: Sequence[Row]) -> Table:
+    """One line's rows: all that fits on 80 columns."""
+    table = plain_table(
+        "strategy", "Hz", "/ latest", "no limits", "RMSE °", "rough", "over °", "most °", "still °",
+        title=title,
+    )  # fmt: skip
+    for row in of_line:
+        f = row.found
+        table.add_row(
+            row.strategy, f"{row.line.rate_hz:g}",
+            f"{row.over_latest:.2f}", f"{row.unlimited_over_latest:.2f}",
+            f"{f.rmse_deg:.2f}", f"{f.roughness:.2f}", f"{f.overshoot_deg:.1f}",
+            f"{f.largest_overshoot_deg:.0f}", f"{f.still_deg:.2f}",
+        )  # fmt: skip
+    return table
 
 
 def _running_ratio(done: Sequence[Row]) -> float | None:
