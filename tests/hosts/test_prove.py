@@ -28,7 +28,7 @@ from deploy.measure.proof import ENCODER, HAND_TO_HAND, HAND_TO_SETPOINT, SERVO
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400), pytest.mark.usefixtures("default_signals")]
 
 SECONDS = "40"
 """Ten segments: a busy host leaves gaps in some, which then do not count."""
