@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from common.quaternion import Array
-from master.capture.clock_line import ClockLines
+from master.capture.clock_line import ClockLines, NodeLine
 
 NONE, STAMP, COUNT = "none", "stamp", "count"
 
@@ -219,3 +221,16 @@ def test_a_node_that_begins_anew_twice_in_a_row_loses_one_sample(kind: str, wrap
     true_s = node.true_s(np.arange(again, again + 50, dtype=np.float64))
     assert np.isnan(found).sum() <= 2
     assert np.nanmax(np.abs(np.array(found) - true_s)[5:]) < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_samples_of_a_quick_counting_node_are_not_too_old_in_its_first_seconds(seed: int) -> None:
+    random, rate_hz = np.random.default_rng(seed), 400.0
+    line = NodeLine(0.0, 65536.0, math.nan)
+    late_s = []
+    for count in range(1200):
+        sampled_s = 1.0 + count / rate_hz
+        arrived_s = sampled_s + 0.0002 + random.exponential(0.0006)
+        if random.random() >= 0.01:
+            late_s.append(sampled_s - line.take(arrived_s, float(count), arrived_s, 0))
+    assert max(late_s) < 0.004
