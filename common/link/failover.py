@@ -15,9 +15,9 @@ from contextlib import asynccontextmanager, suppress
 import zenoh
 
 from common.link.config import LinkConfig
+from common.link.connected import Connected, heeded_by
 from common.link.link_session import LinkSession
 from common.link.opening import in_turn, open_once
-from common.link.revoking import Connected
 
 GRACE_S = 0.1
 """A router whose process ended refuses at once, and Zenoh is at the next one within this time by itself."""
@@ -36,15 +36,8 @@ async def failing_over(
     if config.mode != "client" or len(config.connect) < 2:
         yield
         return
-    connected = Connected()
-    session.watch_peers(connected.on_change)
-    task = asyncio.create_task(_watch(session, config, connected, open_other))
-    try:
+    async with heeded_by(session, lambda connected: _watch(session, config, connected, open_other)):
         yield
-    finally:
-        task.cancel()
-        with suppress(asyncio.CancelledError):
-            await task
 
 
 async def _watch(

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 
+from common.link.connected import Connected, heeded_by
 from common.link.link_session import LinkSession, OpenAgain
 from common.link.revoked import EVERY_S, RevocationFile
 
@@ -27,33 +27,8 @@ async def heeding(
     if revocations is None:
         yield
         return
-    connected = Connected()
-    session.watch_peers(connected.on_change)
-    task = asyncio.create_task(_heed(session, revocations, connected, open_again))
-    try:
+    async with heeded_by(session, lambda connected: _heed(session, revocations, connected, open_again)):
         yield
-    finally:
-        task.cancel()
-        with suppress(asyncio.CancelledError):
-            await task
-
-
-class Connected:
-    """Whose certificates the sessions show that are connected now."""
-
-    def __init__(self) -> None:
-        self._links: Counter[str] = Counter()
-        self.changed = asyncio.Event()
-
-    def on_change(self, _: str, name: str, here: bool) -> None:
-        """A link came or went."""
-        self._links[name] += 1 if here else -1
-        self.changed.set()
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Their common names."""
-        return frozenset(name for name, count in self._links.items() if count > 0)
 
 
 def to_cut(connected: frozenset[str], revoked: frozenset[str], refused: frozenset[str]) -> frozenset[str]:

@@ -65,9 +65,9 @@ def approach(error_rad: Array, goal_rad_s: Array, acceleration_rad_s2: Array, dt
     min(d, max(½, √((1 + g)² + 2d) - 1 - g)).
     d closes the error in this very step: a target that keeps the limits is followed without lag, since
     half a step's acceleration is how far its mean velocity over a step differs from that at its end.
-    The root is `safe_speed` for a target that may brake as well: the joint, v + w fast, still stops where the
-    target does, should that brake with all that the joint has: (v + w)² = v² + 2 a e. So a joint left behind
-    by its limits does not pass the place where the target turns, also where steps come late.
+    The root is `safe_speed` for a target of speed v that may begin to brake now, with the joint's own a. It
+    stops after v² / 2a; the joint, w faster and e behind, must stop there too: (v + w)² = v² + 2 a e. So a
+    joint that its limits left behind does not pass the place where the target turns, also where steps are late.
     """
     step = acceleration_rad_s2 * dt_s
     distance = np.abs(error_rad) / (step * dt_s)

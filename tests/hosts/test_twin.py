@@ -21,6 +21,7 @@ from tests.tcp_path import TcpPath
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
+pytestmark = pytest.mark.live
 NOWHERE = "tcp/192.0.2.1:7447"
 """An address for documentation (RFC 5737): no host has it."""
 CUT_S = 1.5
