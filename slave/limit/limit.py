@@ -67,7 +67,7 @@ def approach(error_rad: Array, goal_rad_s: Array, acceleration_rad_s2: Array, dt
     half a step's acceleration is how far its mean velocity over a step differs from that at its end.
     The root is `safe_speed` for a target of speed v that may begin to brake now, with the joint's own a. It
     stops after v² / 2a; the joint, w faster and e behind, must stop there too: (v + w)² = v² + 2 a e. So a
-    joint that its limits left behind does not pass the place where the target turns, also where steps are late.
+    joint that its limits left behind does not pass where the target turns, also where steps are late.
     """
     step = acceleration_rad_s2 * dt_s
     distance = np.abs(error_rad) / (step * dt_s)
