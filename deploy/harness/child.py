@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -35,6 +36,15 @@ class Usage:
     """User and system time since its start."""
 
 
+def environment_of_a_run(folder: Path, environment: Mapping[str, str]) -> dict[str, str]:
+    """The environment of a process of a run, whose robots remember their joints' angles in the run's folder.
+
+    In the user's own folder they would tell a real robot of the same name where it stood, and one another.
+    """
+    kept = {name: value for name, value in environment.items() if name != "STATE_DIRECTORY"}
+    return kept | {"XDG_STATE_HOME": str(folder / "state")}
+
+
 class Child:
     """One `tandem ROLE FILE` process. Its log and its metrics file lie in the run's folder."""
 
@@ -51,6 +61,7 @@ class Child:
         self._tandem = tandem
         self.log = folder / f"{self.name}.log"
         self.metrics_file = folder / f"{self.name}.metrics.json"
+        self._environment = environment_of_a_run(folder, os.environ)
         self._process: Spawned | None = None
         self._usage: psutil.Process | None = None
         self._cpu_from = (0.0, 0.0)
@@ -76,7 +87,9 @@ class Child:
         self.lifetime += 1
         with self.log.open("ab") as log:
             debug = ["--debug"] if logging.getLogger().isEnabledFor(logging.DEBUG) else []
-            self._process = Spawned([*through, *self._tandem, self.role, *arguments, *debug], log)
+            self._process = Spawned(
+                [*through, *self._tandem, self.role, *arguments, *debug], log, self._environment
+            )
         self._usage = psutil.Process(self._process.pid)
 
     @property

@@ -156,7 +156,7 @@ class Observer:
         if state is None:
             return "the robot is not heard"
         if command is None:
-            return "the master sends no commands"
+            return f"the master sends no commands; the robot is in {state.guard}: {state.reason}"
         if not command.valid.all():
             names = [n for n, ok in zip(self.trace.joint_names, command.valid, strict=True) if not ok]
             return f"{len(names)} joints are not known yet ({', '.join(names[:3])} …)"

@@ -11,16 +11,23 @@ import asyncio
 import os
 import signal
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import IO
 
 
 class Spawned:
     """A process that was started, and how it ended."""
 
-    def __init__(self, argv: Sequence[str], output: IO[bytes]) -> None:
-        """Start it without an input; its output goes to a file. Raises OSError."""
-        self._process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=output, stderr=output)
+    def __init__(
+        self, argv: Sequence[str], output: IO[bytes], environment: Mapping[str, str] | None = None
+    ) -> None:
+        """Start it without an input; its output goes to a file. Raises OSError.
+
+        `environment`: all of it; None: this process's.
+        """
+        self._process = subprocess.Popen(
+            argv, stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environment
+        )
         self.pid = self._process.pid
 
     @property

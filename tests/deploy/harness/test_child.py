@@ -17,6 +17,7 @@ from common.errors import TandemError
 from common.metrics.parts import Ticks
 from deploy.harness import child as child_module
 from deploy.harness.child import Child
+from slave.last_known import state_file
 
 CALL = """
 import json, signal, socket, sys, time
@@ -163,3 +164,29 @@ def test_one_that_was_never_started_is_at_peace(tmp_path: Path) -> None:
     child.measure()
     assert asyncio.run(child.stop()) is None
     assert child.metrics(Ticks) is None
+
+
+SAY_WHERE = """
+import os, pathlib
+told = {name: os.environ.get(name) for name in ("STATE_DIRECTORY", "XDG_STATE_HOME", "HOME")}
+pathlib.Path(sys.argv[2], "told.json").write_text(json.dumps(told))
+here()
+"""
+
+
+def test_a_robot_of_a_run_remembers_its_angles_in_the_run_and_not_where_real_robots_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that was left in its zero pose made the next run wait for a question that nobody asked."""
+    monkeypatch.setenv("STATE_DIRECTORY", "/var/lib/tandem")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+
+    async def story() -> None:
+        async with started(tmp_path, SAY_WHERE.replace("sys.argv[2]", repr(str(tmp_path)))):
+            pass
+
+    asyncio.run(story())
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told["HOME"] == str(tmp_path / "home")
+    environment = {name: value for name, value in told.items() if value is not None}
+    assert state_file("robot-1", environment).is_relative_to(tmp_path / "state")
