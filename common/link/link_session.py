@@ -32,6 +32,9 @@ REOPEN_S = 0.5
 OpenAgain = Callable[[frozenset[str]], Awaitable[zenoh.Session]]
 """Opens a session as the first one, whose rules refuse these common names."""
 
+_Place = tuple[str, str, str, str]
+"""Of a link: the other session, where it begins and ends, whether it is reliable."""
+
 log = logging.getLogger(__name__)
 
 
@@ -104,25 +107,21 @@ class LinkSession:
 
         `name` is the common name of the certificate; empty where the transport has none.
         """
-        names: dict[str, list[str]] = {}
-        """Of each connected session, once a link: the event of its end does not name it."""
+        names: dict[_Place, str] = {}
+        """Of each link: the event of its end does not name it. Zenoh may tell twice that one came."""
 
         def on_event(event: zenoh.LinkEvent) -> None:
-            session_id, here = str(event.link.zid), event.kind == zenoh.SampleKind.PUT
+            place, here = _place_of(event.link), event.kind == zenoh.SampleKind.PUT
+            if here == (place in names):
+                return
             if here:
-                name = event.link.auth_identifier or ""
-                names.setdefault(session_id, []).append(name)
-            else:
-                links = names.get(session_id, [""])
-                name = links.pop()
-                if not links:
-                    names.pop(session_id, None)
-            wake(self._loop, on_change, session_id, name, here)
+                names[place] = event.link.auth_identifier or ""
+            name = names[place] if here else names.pop(place)
+            wake(self._loop, on_change, place[0], name, here)
 
         def declare(session: zenoh.Session) -> object:
-            for session_id, of_links in names.items():
-                for name in of_links:
-                    wake(self._loop, on_change, session_id, name, False)
+            for (session_id, *_), name in names.items():
+                wake(self._loop, on_change, session_id, name, False)
             names.clear()
             on_this = self._declared.only_of(session, on_event)
             return session.info.declare_link_events_listener(Callback(on_this, indirect=False), history=True)
@@ -215,6 +214,11 @@ class LinkSession:
         except Exception as error:  # a link that leads nowhere: nothing to be done about it now
             log.debug("error while closing the session: %s", error)
         wake(self._loop, _settle, closed)
+
+
+def _place_of(link: zenoh.Link) -> _Place:
+    # quic-datagram has two links between the same two places
+    return str(link.zid), str(link.src), str(link.dst), str(link.reliability)
 
 
 def _settle(closed: asyncio.Future[None]) -> None:

@@ -17,6 +17,7 @@ from common.clock import monotonic_ns
 from common.errors import LinkError, LinkTimeoutError
 from common.link import Link, LinkSession, open_link, open_session
 from common.link.config import LinkConfig, TopicConfig
+from common.link.connected import Connected
 from common.link.declared import Declarations
 from common.link.presence import watch_presence
 from common.link.queries import MAX_WAITING, Answerer
@@ -531,9 +532,20 @@ class Links:
         self.handler = handler
         return history
 
-    def tell(self, session_id: str, here: bool, name: str | None = None) -> None:
+    def tell(
+        self,
+        session_id: str,
+        here: bool,
+        name: str | None = None,
+        reliability: str = "reliable",
+        port: int = 1,
+    ) -> None:
         kind = zenoh.SampleKind.PUT if here else zenoh.SampleKind.DELETE
-        self.handler(SimpleNamespace(kind=kind, link=SimpleNamespace(zid=session_id, auth_identifier=name)))
+        link = SimpleNamespace(
+            zid=session_id, auth_identifier=name, src="tcp/here:7447", dst=f"tcp/there:{port}",
+            reliability=reliability,
+        )  # fmt: skip
+        self.handler(SimpleNamespace(kind=kind, link=link))
 
 
 def test_who_goes_is_named_as_he_came_and_forgotten_then() -> None:
@@ -544,18 +556,44 @@ def test_who_goes_is_named_as_he_came_and_forgotten_then() -> None:
         session = LinkSession(links, asyncio.get_running_loop())  # type: ignore[arg-type]
         session.watch_peers(lambda *change: heard.append(change))
         links.tell("a", True, "operator:anna")
-        links.tell("a", True, "operator:anna")  # a second link, as quic-datagram may have
+        links.tell("a", True, "operator:anna", "best effort")  # a second link, as quic-datagram has
+        links.tell("a", True, "operator:anna", port=2)  # and one of another path
         links.tell("b", True)
-        for session_id in ("a", "b", "a", "a"):
-            links.tell(session_id, False)
-        await until(lambda: len(heard) == 7)
+        for reliability in ("reliable", "best effort"):
+            links.tell("a", False, reliability=reliability)
+        links.tell("b", False)
+        links.tell("a", False, port=2)
+        await until(lambda: len(heard) == 8)
 
     run(test)
     anna = "operator:anna"
     assert heard == [
-        ("a", anna, True), ("a", anna, True), ("b", "", True),
-        ("a", anna, False), ("b", "", False), ("a", anna, False), ("a", "", False),
+        ("a", anna, True), ("a", anna, True), ("a", anna, True), ("b", "", True),
+        ("a", anna, False), ("a", anna, False), ("b", "", False), ("a", anna, False),
     ]  # fmt: skip
+
+
+def test_a_link_of_which_zenoh_tells_twice_is_one_link() -> None:
+    """Told while the listener was declared and again by its history: who has gone stayed for ever."""
+    connected = Connected()
+    heard: list[bool] = []
+
+    async def test() -> None:
+        links = Links()
+        session = LinkSession(links, asyncio.get_running_loop())  # type: ignore[arg-type]
+
+        def on_change(*change: *tuple[str, str, bool]) -> None:
+            heard.append(change[2])
+            connected.on_change(*change)
+
+        session.watch_peers(on_change)
+        for here in (True, True, False, False, True, False):
+            links.tell("a", here, "operator:anna")
+        await until(lambda: len(heard) == 4)
+
+    run(test)
+    assert heard == [True, False, True, False]
+    assert not connected.names
 
 
 class Tokens:
