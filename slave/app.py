@@ -252,6 +252,7 @@ class Slave:
             servos=servo_metrics(self._servos, self._config),
             video=self._cameras.main_metrics(),
             other_videos=self._cameras.other_metrics(),
+            lenses=self._cameras.lenses,
             link=self._link.counters(),
             paths=self._link.paths,
         )

@@ -87,7 +87,7 @@ class SlaveConfig(Section):
             *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),
             *self._too_fresh_pictures(),
-            *self.camera.mistakes(),
+            *self.camera.mistakes_for(skeleton),
             *self.link.mistakes(),
             *self.tap.mistakes(),
             *self.console.mistakes(),

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from common.clock import to_ms
 from common.clock_sync import SlaveExchange
+from common.metrics.lens import Lens
 from common.metrics.link import TopicCounters
 from common.metrics.parts import Ticks
 from common.metrics.slave import CameraMetrics, OffsetMetrics, ServoMetrics, SlaveMetrics
@@ -26,6 +27,7 @@ def slave_metrics(
     servos: ServoMetrics,
     video: CameraMetrics | None,
     other_videos: dict[str, CameraMetrics],
+    lenses: dict[str, Lens],
     link: dict[str, TopicCounters],
     paths: str = "",
 ) -> SlaveMetrics:
@@ -52,6 +54,7 @@ def slave_metrics(
         servos=servos,
         video=video,
         other_videos=other_videos,
+        lenses=lenses,
         link=link,
         paths=paths,
         contact_from="" if pipeline.contact.missing(now_ns) else pipeline.contact.dull,

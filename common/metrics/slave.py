@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from common.metrics.bus import BusMetrics
+from common.metrics.lens import Lens
 from common.metrics.link import AccessMetrics, TopicCounters
 from common.metrics.parts import HeapMetrics, Software, Summary, Ticks
 from common.metrics.tree import Metrics
@@ -202,5 +203,7 @@ class SlaveMetrics(Metrics):
     """Of two paths, which one does not carry and why; see `[link.twin]`."""
     other_videos: dict[str, CameraMetrics] = field(default_factory=dict)
     """Of the cameras beside the main one, by name."""
+    lenses: dict[str, Lens] = field(default_factory=dict)
+    """How each camera sees the robot, by name, as far as it is known."""
     access: AccessMetrics | None = None
     """In the file at the end only."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
 from common.clock_sync import Offset
 from common.link import Link
+from common.metrics.lens import Lens
 from common.metrics.slave import CameraMetrics
 from common.quaternion import Array
+from common.skeleton import load_skeleton
 from common.wire.messages import Command
 from common.wire.topics import keyframe, video
 from slave.camera.config import CameraConfig
@@ -21,8 +23,10 @@ from slave.guard.eyes import video_loss
 class Cameras:
     """A feed for each camera, each with a thread, a process, a topic and a rate of its own."""
 
-    def __init__(self, feeds: Sequence[CameraFeed]) -> None:
+    def __init__(self, feeds: Sequence[CameraFeed], lenses: Mapping[str, Lens]) -> None:
+        """`lenses`: how each sees the robot, by name, as far as it is known."""
         self.feeds = list(feeds)
+        self.lenses = dict(lenses)
         self._stack = ExitStack()
 
     def __enter__(self) -> Cameras:
@@ -75,8 +79,11 @@ def open_cameras(configs: Sequence[CameraConfig], profile: str, link: Link, alwa
     `always`: pictures are made although nobody on the link looks, as somebody at the tap does.
     """
     places = [(index, len(configs)) for index in range(len(configs))]
+    skeleton = load_skeleton(profile)
+    seen = {one.name: one.lens(skeleton) for one in configs}
     return Cameras(
-        [_open(one, profile, link, always, place) for one, place in zip(configs, places, strict=True)]
+        [_open(one, profile, link, always, place) for one, place in zip(configs, places, strict=True)],
+        {name: lens for name, lens in seen.items() if lens is not None},
     )
 
 

@@ -9,7 +9,10 @@ from pydantic import BeforeValidator, Field
 from common.config.load import REST
 from common.config.section import Section
 from common.errors import ConfigMistake
+from common.metrics.lens import Lens
+from common.skeleton import Skeleton
 from common.wire.topics import VIDEO_NAME
+from slave.camera.lens import CalibrationConfig, eye
 
 MOST = 3
 """Cameras of a robot."""
@@ -41,8 +44,26 @@ class CameraConfig(Section):
     """Size of one picture at best, kB."""
     time_card: bool = False
     """With `robot`: a card before the lens shows the time, by which the latency to the eye is measured."""
+    calibration: CalibrationConfig | None = None
+    """Of a real camera: where it stands and how it sees, for what is drawn over its picture."""
     relied_on: bool = True
     """Whether the robot holds by `[guard] max_video_age_s` when the operator's picture of it grows old."""
+
+    def lens(self, skeleton: Skeleton) -> Lens | None:
+        """How it sees the robot; None where that is not known."""
+        if self.calibration is not None:
+            return self.calibration.lens
+        return eye(skeleton, self.name, self.width, self.height) if self.source == "robot" else None
+
+    def mistakes_of(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        """Of its calibration."""
+        if self.calibration is None:
+            return []
+        if self.source == "robot":
+            expected = "nothing with source robot: a simulated robot's own eye is known"
+            return [ConfigMistake("calibration", "given", expected)]
+        found = self.calibration.mistakes_for(skeleton, self.width, self.height)
+        return [ConfigMistake(f"calibration.{one.key}", one.value, one.expected) for one in found]
 
 
 class CamerasConfig(CameraConfig):
@@ -56,9 +77,13 @@ class CamerasConfig(CameraConfig):
         main = CameraConfig.model_validate(self.model_dump(exclude={"others"}))
         return [one for one in (main, *self.others) if one.source != "off"]
 
-    def mistakes(self) -> list[ConfigMistake]:
-        """Each name, and each real camera's device, once."""
-        found = []
+    def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        """Each name, and each real camera's device, once; calibrations that fit the robot."""
+        found = [
+            ConfigMistake(f"camera.{one.key}", one.value, one.expected)
+            for camera in self.all
+            for one in camera.mistakes_of(skeleton)
+        ]
         for key, values in (
             ("name", [one.name for one in self.all]),
             ("device", [one.device for one in self.all if one.source == "v4l2"]),

@@ -17,6 +17,7 @@ import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import WORLD, Joint, RobotLink, Skeleton
+from slave.model import eye
 from slave.model.capsules import capsules, links
 from slave.model.own import COMPENSATED, ServoGains, compile_own, leader
 
@@ -121,10 +122,11 @@ def _body(parent: ET.Element, link: RobotLink, hinges: dict[str, dict[str, str]]
         if hinge.name in hinges:
             kind, place = "slide" if hinge.slides else "hinge", _text(hinge.anchor_m)
             ET.SubElement(body, "joint", hinges[hinge.name], type=kind, axis=_text(hinge.axis), pos=place)
-    if link.name == "head":
-        ET.SubElement(body, "site", name="head", pos="0.09 0 0.1")
-        # at the eyes, looking ahead: image right is -y, image up is z
-        ET.SubElement(body, "camera", name="head", pos="0.09 0 0.1", xyaxes="0 -1 0 0 0 1", fovy="70")
+    if link.name == eye.LINK:
+        at = _text(eye.POSITION_M)
+        ET.SubElement(body, "site", name="head", pos=at)
+        axes, field = _text((*eye.RIGHT, *eye.UP)), f"{eye.FIELD_DEG!r}"
+        ET.SubElement(body, "camera", name=eye.NAME, pos=at, xyaxes=axes, fovy=field)
     return body
 
 

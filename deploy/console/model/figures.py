@@ -8,6 +8,7 @@ from common.clock import NS_PER_S
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary
 from common.metrics.slave import SlaveMetrics
+from common.metrics.tree import to_tree
 from deploy.client.shift import shift_lines
 from deploy.console.model.events import EventList
 from deploy.console.model.nodes import NodeWatch
@@ -94,6 +95,7 @@ class RobotFigures:
             "shift": list(shift_lines(master)),
             "switches": {} if master is None else master.switches,
             "drives": {} if robot is None else _drives(robot),
+            "lenses": {} if robot is None else {name: to_tree(one) for name, one in robot.lenses.items()},
             "camera": None
             if video is None
             else {"fps": round(video.fps, 1), "kb_s": round(video.kb_s, 1), "fault": video.fault},

@@ -1,5 +1,5 @@
 // The robot that will be: how thick its uncertainty makes each link. No document, no clock.
-import { rotate } from "./kinematics.js";
+import { placeLinks, rotate } from "./kinematics.js";
 
 const MOST_M = 0.15; // wider than that says no more
 
@@ -22,4 +22,12 @@ export function tubes(links, placed, tube_rad) {
       Math.hypot(...chains[i].map(({ half, at, slides }) => half * (slides ? 1 : Math.hypot(...end.map((value, k) => value - at[k]))))));
     return Math.min(MOST_M, Math.max(0, ...off));
   });
+}
+
+/** Where the robot is seen and where it is by now, of a view: { now, will, more_m }; null where it is not foretold. */
+export function foretold(view, links) {
+  if (!view.ahead || view.heard === "none") return null;
+  const now = view.encoder.map((angle) => angle ?? 0);
+  const will = now.map((angle, j) => view.ahead.position[j] ?? angle);
+  return { now, will, more_m: tubes(links, placeLinks(links, will), view.ahead.tube) };
 }

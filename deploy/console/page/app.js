@@ -3,8 +3,10 @@ import { Link, setup as askSetup } from "./link.js";
 import { badges, confirms, joints_off, situation, stopLights } from "./state.js";
 import { choose, chosen, LANGUAGES, load, nameOf, other, t, translate } from "./words.js";
 import {
-  attention, BodyFigure, Cameras, Events, JointTable, latencyNow, link as linkFacts, make, Minute, shape,
+  attention, BodyFigure, Events, JointTable, latencyNow, link as linkFacts, make, Minute, shape,
 } from "./facts.js";
+import { Cameras } from "./cameras.js";
+import { foretold } from "./ahead.js";
 import { Fleet } from "./fleet.js";
 import { Glass, worst } from "./glass.js";
 
@@ -232,6 +234,7 @@ function view(message) {
     if ($("off")) $("off").textContent = off.map(({ joint, off_deg }) => t("off", { joint: nameOf(seen.setup.joints[joint].name), degrees: off_deg.toFixed(0) }) + held(joint)).join(" · ");
   }
   cameras(Object.keys(message.video ?? {}));
+  parts.cameras?.foretell(seen.facts?.lenses, seen.setup?.links, known ? foretold(message, seen.setup.links) : null);
   latencyNow(message.latency);
   parts.more?.view(message);
   show();

@@ -1,5 +1,5 @@
 // The facts beside the picture and the robot: latency and its last minute, link, suit, events, joints.
-import { FILLED, picture, SHAPES } from "./state.js";
+import { FILLED, SHAPES } from "./state.js";
 import { chosen, nameOf, t } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
@@ -253,77 +253,6 @@ export class JointTable {
       row.title = view.limited?.includes(j) ? t("limited") : "";
       row.classList.toggle("off", typeof measured === "number" && typeof aimed === "number" && Math.abs(measured - aimed) > 5);
     });
-  }
-}
-
-/** The pictures of the patient's home, each with its own age: one that freezes does not freeze the others. */
-export class Cameras {
-  constructor(element, names) {
-    this.cameras = new Map();
-    element.replaceChildren(...(names.length ? names : [""]).map((name) => {
-      const box = make("div", "", { class: "camera none" });
-      const canvas = make("canvas", "", { role: "img", "aria-label": t("picture.of", { camera: nameOf(name) }) });
-      const over = make("p", "", { class: "over" });
-      box.append(canvas, over);
-      this.cameras.set(name, { box, over, canvas, header: null });
-      return box;
-    }));
-    this.speak();
-  }
-
-  speak() {
-    for (const [name, { over, header }] of this.cameras) {
-      if (!header) over.textContent = t(name ? "picture.none" : "picture.no_camera");
-    }
-  }
-
-  has(name) {
-    return this.cameras.has(name);
-  }
-
-  names() {
-    return [...this.cameras.keys()].filter(Boolean);
-  }
-
-  /** Another robot is shown: none of its pictures came yet. */
-  clear() {
-    for (const camera of this.cameras.values()) {
-      camera.header = null;
-      camera.box.classList.add("none");
-      camera.box.classList.remove("stale");
-      camera.canvas.width = camera.canvas.height = 1;
-    }
-    this.speak();
-  }
-
-  /** Draw a picture; the canvas that shows it now. */
-  take(header) {
-    const camera = this.cameras.get(header.camera);
-    if (camera) {
-      const { canvas } = camera;
-      if (canvas.width !== header.bitmap.width) canvas.width = header.bitmap.width;
-      if (canvas.height !== header.bitmap.height) canvas.height = header.bitmap.height;
-      canvas.getContext("2d").drawImage(header.bitmap, 0, 0);
-      camera.header = header;
-    }
-    header.bitmap.close();
-    return camera?.canvas;
-  }
-
-  /** Say how old each picture is now, and in `line` how old the oldest is. */
-  tick(line, page_ms, stale_s) {
-    let oldest = null;
-    for (const { box, over, header } of this.cameras.values()) {
-      if (!header) continue;
-      const found = picture(header, page_ms, (performance.now() - header.arrived_ms) / 1000, stale_s);
-      box.classList.remove("none");
-      box.classList.toggle("stale", found.stale);
-      if (found.stale) over.textContent = t(found.known ? "picture.stale" : "picture.stale_least", { age: found.age_s.toFixed(1) });
-      if (!oldest || found.age_s > oldest.age_s) oldest = found;
-    }
-    if (!oldest || !line) return;
-    const age = { age: oldest.age_s.toFixed(1), ms: (oldest.age_s * 1000).toFixed(0), bound: Math.ceil(oldest.bound_ms ?? 0) };
-    line.textContent = t(!oldest.known ? "picture.age_unknown" : oldest.stale ? "picture.old" : "picture.age", age);
   }
 }
 

@@ -10,7 +10,10 @@ import simplejpeg
 from playwright.sync_api import sync_playwright
 
 from common.errors import RobotError
+from common.metrics.tree import to_tree
+from common.skeleton import load_skeleton
 from slave.camera.drawn import DrawnCamera
+from slave.camera.lens import eye
 from tests.browser.console.browser import ARGUMENTS, CHROMIUM
 from tests.browser.console.fake import FakeConsole
 
@@ -19,11 +22,25 @@ def _room(fake: FakeConsole) -> bytes | None:
     """What the simulated robot sees, arms ahead; None where this machine cannot draw."""
     try:
         camera = DrawnCamera("nursing", "head", 640, 480)
-        posture = np.array(fake.posture(0.0))
-        posture[[j["name"] == "neck_pitch" for j in fake.shape["joints"]]] = 0.35
+        posture = np.array(_bowed(fake, 0.0))
         return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(camera.draw(posture)), quality=85))
     except RobotError:
         return None
+
+
+def _bowed(fake: FakeConsole, at_s: float) -> list[float]:
+    """Its posture at a time, the head bowed to its hands."""
+    names = [joint["name"] for joint in fake.shape["joints"]]
+    return [0.35 if n == "neck_pitch" else angle for n, angle in zip(names, fake.posture(at_s), strict=True)]
+
+
+def _foretell(fake: FakeConsole) -> None:
+    """The robot is seen as it was, and is somewhere else by now."""
+    lens, will = eye(load_skeleton("nursing"), "head", 640, 480), _bowed(fake, 0.5)
+    assert lens is not None
+    fake.facts = {"lenses": {"head": to_tree(lens)}}
+    foretold = {"position": will, "tube": [0.02] * len(will), "ahead_ms": 150.0}
+    fake.view = {"encoder": _bowed(fake, 0.0), "ahead": foretold}
 
 
 def _say(what: object) -> None:
@@ -46,6 +63,10 @@ def main(folder: Path, only: str = "") -> None:
             page.wait_for_selector("#scene canvas")
             page.wait_for_timeout(1500)
             page.screenshot(path=folder / f"{name}-follows.png")
+            _foretell(fake)
+            page.wait_for_timeout(1500)
+            page.screenshot(path=folder / f"{name}-foretold.png")
+            fake.facts, fake.view = {}, {}
             page.keyboard.press("Escape")
             page.wait_for_timeout(700)
             page.screenshot(path=folder / f"{name}-stopped.png")

@@ -50,7 +50,7 @@ def running(*codes: str) -> Iterator[tuple[Cameras, list[Link]]]:
                 place=(index, len(codes)),
             )
         )
-    with Cameras(feeds) as cameras:
+    with Cameras(feeds, {}) as cameras:
         cameras.look(np.zeros(25), 12345)
         yield cameras, links
 

@@ -142,10 +142,10 @@ async def measure(
         same_clock = Offset(0, to_ns(options.delay_s), trusted=True)
         watch, commands, states = CamerasWatch(), Durations(), Durations()
         came: dict[str, list[int]] = {}
-        feeds = Cameras([])
+        feeds = Cameras([], {})
         if video != "off":
             make = Uncontrolled if video == "uncontrolled" else RateControl
-            feeds = Cameras([_feed(robot, cameras, index, make) for index in range(cameras.count)])
+            feeds = Cameras([_feed(robot, cameras, index, make) for index in range(cameras.count)], {})
             feeds.look(_ZERO, monotonic_ns())
 
             def on_picture(key: str, payload: bytes, arrived_ns: int) -> None:
