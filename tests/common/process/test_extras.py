@@ -32,6 +32,10 @@ def without(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
     for loaded in list(sys.modules):
         if loaded.partition(".")[0] == module or loaded.startswith(("slave.servos.", "deploy.sim.drives.")):
+            package, _, name = loaded.rpartition(".")
+            if package in sys.modules and hasattr(sys.modules[package], name):
+                # imported again it takes its package's attribute too, which must not outlive this test
+                monkeypatch.setattr(sys.modules[package], name, sys.modules[loaded])
             monkeypatch.delitem(sys.modules, loaded)
     monkeypatch.setattr(builtins, "__import__", import_)
 
