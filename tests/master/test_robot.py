@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from common.clock import monotonic_ns, to_ns
+from common.clock_sync.exchange import SlaveExchange
 from common.config.load import load_config
 from common.metrics.master import MasterMetrics
 from common.wire.codec import VERSION, decode, encode
@@ -20,7 +21,6 @@ from common.wire.lease import lease_id
 from common.wire.messages import (
     Action,
     ClockQuery,
-    ClockReply,
     Command,
     CommandEcho,
     ControlReply,
@@ -34,7 +34,7 @@ from master.alarms.situation import RobotSign
 from master.app import Master
 from master.config import MasterConfig
 from master.joint_angles.sample import JointAngleSample
-from master.robot import CLOCK_SETTLED, CommandedRobot, asks_clock
+from master.robot import CLOCK_QUICK, CLOCK_SETTLED, CommandedRobot, asks_clock
 from tests.published import master_metrics
 
 EXAMPLE = Path(__file__).parents[2] / "deploy" / "examples" / "master.toml"
@@ -52,6 +52,8 @@ class FakeLink:
     hear: dict[str, Callable[[bytes, int], None]] = field(default_factory=dict)
     told: list[ControlRequest] = field(default_factory=list)
     instance: int = 1
+    clock: SlaveExchange = field(default_factory=SlaveExchange)
+    clock_asked: int = 0
 
     def publish(self, topic: Topic) -> Callable[[bytes], None]:
         return self.put.setdefault(topic.name, []).append
@@ -80,8 +82,11 @@ class FakeLink:
         if self.fails is not None:
             raise self.fails("planted")
         if topic is CLOCK:
+            self.clock_asked += 1
             query = decode(payload, ClockQuery)
-            return encode(ClockReply(query.asked_ns, 10**15, 10**15, self.instance)), query.asked_ns + 1000
+            received_ns = 10**15 + query.asked_ns
+            reply = self.clock.on_query(query, received_ns, received_ns)
+            return encode(replace(reply, instance=self.instance)), query.asked_ns + 1000
         assert topic == CONTROL.of("nurse-1")
         self.asked.append(decode(payload, ControlRequest).action)
         return encode(ControlReply(True, "hold", "yours", self.token, instance=self.instance)), 0
@@ -263,6 +268,34 @@ def test_the_clock_of_a_robot_that_stands_is_asked_at_half_the_rate_once_it_is_k
     assert all(asks_clock(turn, moves=True) for turn in later)
     # the robot takes another asker after a second of silence
     assert all(any(asks_clock(turn + i, moves=False) for i in range(2)) for turn in later)
+
+
+def test_the_robot_trusts_the_clock_at_the_first_turn_of_the_exchange() -> None:
+    """A nurse who takes a robot waited 0.7 s for four turns of it."""
+    link: Any = FakeLink()
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
+    link.clock.follow(robot.clock.asker)
+
+    def trusted() -> bool:
+        newest_ns = 10**15 + monotonic_ns()
+        return bool(link.clock.estimate(newest_ns).trusted)
+
+    async def turns(clock_of: int) -> None:
+        asked, link.instance = link.clock_asked, clock_of
+        turn = asyncio.create_task(robot._keep_clock())
+        while link.clock_asked == asked:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+        turn.cancel()
+
+    asyncio.run(turns(1))
+    assert trusted()
+    assert link.clock_asked == 1 + CLOCK_QUICK
+    asyncio.run(turns(1))
+    assert link.clock_asked == 2 + CLOCK_QUICK, "and then as ever"
+    link.clock = SlaveExchange()
+    link.clock.follow(robot.clock.asker)
+    asyncio.run(turns(2))
+    assert trusted(), "a robot that was started anew has measured nothing"
 
 
 def test_a_robot_that_obeyed_and_fell_silent_is_sent_no_more_than_the_usual_rate() -> None:
