@@ -117,22 +117,26 @@ class _Opening:
 
     async def _attach_late(self, twin: TwinSession, path: int, opening: asyncio.Task[zenoh.Session]) -> None:
         """Attach a path once it is there; a robot looks for it for ever, a command as long as it was told."""
-        while True:
-            try:
-                session = await opening
-            except LinkError as error:
-                if not math.isinf(self._within_s):
+        attached = False
+        try:
+            while not attached:
+                try:
+                    attached = await twin.attach(path, await opening)
+                except (LinkError, zenoh.ZError) as error:
+                    if not math.isinf(self._within_s):
+                        return
+                    self._missing[path] = str(error)
+                    log.warning("%s: %s; trying again", self._names[path], error)
+                    await asyncio.sleep(MOST_RETRY_S)
+                    if opening.exception() is not None:
+                        opening = self._open(path)
+                    continue
+                if not attached:
                     return
-                self._missing[path] = str(error)
-                log.warning("%s: %s; trying again", self._names[path], error)
-                await asyncio.sleep(MOST_RETRY_S)
-                opening = self._open(path)
-                continue
-            if await twin.attach(path, session):
-                log.info("%s: is open now; both paths are in use", self._names[path])
-            else:
-                close_unwanted(opening)
-            return
+            log.info("%s: is open now; both paths are in use", self._names[path])
+        finally:
+            if not attached:
+                opening.add_done_callback(close_unwanted)
 
 
 def _cancel(loop: asyncio.AbstractEventLoop, tasks: list[asyncio.Task[None]]) -> None:

@@ -33,6 +33,10 @@ class OnPaths(Generic[Part]):
         self.each: tuple[Part, ...] = ()
         """What holds it on each path. Replaced as a whole: Zenoh's threads read it."""
 
+    def is_on(self, path: int) -> bool:
+        """Whether it is declared on that path."""
+        return path in self._parts
+
     def open(self, path: int, session: zenoh.Session) -> None:
         """Declare it on a path too."""
         if path not in self._parts:
@@ -77,16 +81,16 @@ class TwinSession:
     async def attach(self, path: int, session: zenoh.Session) -> bool:
         """A path that was missing has opened; False where this session was closed meanwhile.
 
-        The loop goes on between two declarations: a robot may be following.
+        The loop goes on between two declarations: a robot may be following. Raises ZError where one fails;
+        called again with the same session it goes on there. Who calls closes a session that is not attached.
         """
+        while (lacks := next((one for one in self._declared if not one.is_on(path)), None)) is not None:
+            lacks.open(path, session)
+            await asyncio.sleep(0)
         with self._closing:
             if self._closed:
                 return False
             self._sessions[path] = session  # from now on in use for what is declared or asked
-        for declared in tuple(self._declared):
-            if declared in self._declared:
-                declared.open(path, session)
-            await asyncio.sleep(0)
         self.missing.pop(path, None)
         return True
 
