@@ -38,16 +38,20 @@ class Declarations:
         self._makers.pop(number, None)
         _undeclare(self._held.pop(number, None))
 
-    def only_of(self, session: zenoh.Session, on_event: Callable[[Event], object]) -> Callable[[Event], None]:
-        """`on_event` as long as that session is in use; what it tells later is dropped.
+    def only_of(
+        self,
+        session: zenoh.Session,
+        on_event: Callable[[Event], object],
+        later: Callable[[Event], object] = lambda _: None,
+    ) -> Callable[[Event], None]:
+        """`on_event` as long as that session is in use, then `later`, which drops what is told.
 
         A session that does not close in time is left to itself. Who then goes in it has not gone in the new
-        one, and would not come again there.
+        one, and would not come again there. And the rules by which it lets somebody in are the old ones.
         """
 
         def heard(event: Event) -> None:
-            if self.session is session:
-                on_event(event)
+            (on_event if self.session is session else later)(event)
 
         return heard
 

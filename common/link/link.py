@@ -89,9 +89,8 @@ class Link:
             if on_wanted is None:
                 return publisher
             on_wanted(is_matching(publisher.matching_status))
-            changed: Callback[zenoh.MatchingStatus] = Callback(
-                lambda status: on_wanted(is_matching(status)), indirect=False
-            )
+            on_this = self._declared.only_of(session, lambda status: on_wanted(is_matching(status)))
+            changed: Callback[zenoh.MatchingStatus] = Callback(on_this, indirect=False)
             listener = publisher.declare_matching_listener(changed)
             return [listener, publisher]
 
@@ -139,7 +138,12 @@ class Link:
             else Inbox(key, taken, self._loop, counters)
         )
         self._receivers.append(inbox)
-        self._declare(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
+
+        def declare(session: zenoh.Session) -> object:
+            on_this = self._declared.only_of(session, inbox.on_sample)
+            return session.declare_subscriber(key, Callback(on_this, indirect=False))
+
+        self._declare(declare)
 
     def answer(self, topic: Topic, handler: Callable[[bytes, int], bytes]) -> None:
         """Answer other sessions' questions with `handler(payload, arrived_ns)`, run on the loop.
@@ -153,9 +157,12 @@ class Link:
         key = topic.key_for(self.robot)
         answerer = Answerer(key, handler, self._loop, self._count(topic), self._quality(topic).express)
         self._receivers.append(answerer)
-        self._declare(
-            lambda s: s.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
-        )
+
+        def declare(session: zenoh.Session) -> object:
+            on_this = self._declared.only_of(session, answerer.on_query, answerer.on_query_of_old)
+            return session.declare_queryable(key, Callback(on_this, indirect=False), complete=True)
+
+        self._declare(declare)
 
     async def connected(self, topic: Topic | None = None, timeout_s: float = CONNECT_TIMEOUT_S) -> None:
         """Wait for another session, and where a topic is given, for one that answers its questions.

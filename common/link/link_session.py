@@ -95,7 +95,12 @@ class LinkSession:
         watch_operators(self._declared, self._loop, roster.on_operator)
         key = SUMMARY.key_for("*")
         inbox = Inbox(key, roster.on_summary, self._loop, TopicCounters(), most_keys=MOST_ROBOTS)
-        self._declared.add(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
+
+        def declare(session: zenoh.Session) -> object:
+            on_this = self._declared.only_of(session, inbox.on_sample)
+            return session.declare_subscriber(key, Callback(on_this, indirect=False))
+
+        self._declared.add(declare)
 
     def declare_operator(self, operator: str, endpoints: Sequence[str]) -> None:
         """Show that this operator's master lives, until the session closes or dies."""

@@ -67,6 +67,13 @@ class Answerer:
         self._arrived += 1
         wake(self._loop, self._answer, query, payload, arrived_ns)
 
+    def on_query_of_old(self, query: zenoh.Query) -> None:
+        """From a session that another has replaced, in Zenoh's thread: it may do nothing but stop."""
+        if query.payload is not None and read_stop(query.payload.to_bytes()) is not None:
+            self.on_query(query)
+        else:
+            query.drop()
+
     def close(self) -> None:
         """Answer nothing from now on."""
         self._closed = True

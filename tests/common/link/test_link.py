@@ -24,7 +24,7 @@ from common.link.queries import MAX_WAITING, Answerer
 from common.metrics.link import TopicCounters
 from common.wire.presence import ProcessPresence
 from common.wire.stop import pack_stop
-from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, Priority
+from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, VIDEO, Priority
 
 ROBOT = "robot-1"
 DEADLINE_S = 10.0
@@ -637,3 +637,84 @@ def test_who_goes_in_a_session_that_was_replaced_has_not_gone_in_the_new_one() -
     run(test)
     assert linked == [True]
     assert shown == [True, False]
+
+
+class Topics:
+    """Stands for Zenoh's session as far as it hears messages and questions and tells who listens."""
+
+    def __init__(self) -> None:
+        self.handlers: dict[str, Callable[[Any], None]] = {}
+        self.matching_status = False
+
+    def declare_subscriber(self, key: str, handler: Any) -> None:
+        self.handlers[key] = handler.callback
+
+    def declare_queryable(self, key: str, handler: Any, complete: bool) -> None:
+        self.handlers[key] = handler.callback
+
+    def declare_publisher(self, key: str, **_: object) -> Any:
+        return self
+
+    def put(self, payload: bytes) -> None: ...
+
+    def declare_matching_listener(self, changed: Any) -> None:
+        self.handlers["matching"] = changed.callback
+
+
+class Bytes(bytes):
+    """Stands for a zenoh.ZBytes."""
+
+    def to_bytes(self) -> bytes:
+        return bytes(self)
+
+
+class Question:
+    """Stands for a zenoh.Query."""
+
+    def __init__(self, key: str, payload: bytes) -> None:
+        self.key_expr, self.payload = key, Bytes(payload)
+        self.answers: list[bytes] = []
+        self.dropped = False
+
+    def __enter__(self) -> object:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def drop(self) -> None:
+        self.dropped = True
+
+    def reply(self, key: str, payload: bytes, *, express: bool) -> None:
+        self.answers.append(payload)
+
+
+def test_a_session_that_was_replaced_may_do_nothing_but_stop() -> None:
+    """It may live on for long, and lets in whom the new one's rules refuse."""
+    heard: list[bytes] = []
+    wanted: list[bool] = []
+    key, questions = STATE.key_for(ROBOT), "tandem/robot-1/operator/anna/control"
+
+    async def test() -> None:
+        old, new = Topics(), Topics()
+        declared = Declarations(old)  # type: ignore[arg-type]
+        link = Link(declared, ROBOT, asyncio.get_running_loop())
+        link.subscribe(STATE, lambda payload, _: heard.append(payload))
+        link.answer(CONTROL, lambda payload, _: b"done")
+        link.publish(VIDEO, on_wanted=wanted.append)
+        declared.move(new)  # type: ignore[arg-type]
+        asked: list[Question] = []
+        for session, words in ((old, b"revoked"), (new, b"here")):
+            sample = SimpleNamespace(attachment=None, key_expr=key, payload=Bytes(words))
+            session.handlers[key](sample)
+            for payload in (b"engage", pack_stop(ROBOT, "anna")):
+                asked.append(Question(questions, payload))
+                session.handlers[CONTROL.key_for(ROBOT)](asked[-1])
+        new.handlers["matching"](True)
+        old.handlers["matching"](False)
+        await until(lambda: heard and asked[-1].answers)
+        assert [bool(one.answers) for one in asked] == [False, True, True, True]
+        assert [one.dropped for one in asked] == [True, False, False, False], "the asker need not wait"
+
+    run(test)
+    assert heard == [b"here"]
+    assert wanted[-1], "somebody looks at the pictures, whatever the old session still tells"
