@@ -96,6 +96,7 @@ async def until(reached: Callable[[], object], timeout_s: float = 20.0) -> None:
             await asyncio.sleep(0.01)
 
 
+@pytest.mark.live
 def test_every_message_comes_once_and_goes_on_when_one_path_is_cut() -> None:
     async def story() -> None:
         async with two_hosts() as (operator, robot, first, second):
@@ -116,6 +117,7 @@ def test_every_message_comes_once_and_goes_on_when_one_path_is_cut() -> None:
     asyncio.run(story())
 
 
+@pytest.mark.live
 def test_a_single_path_that_is_cut_delivers_nothing() -> None:
     async def story() -> None:
         async with two_hosts(twin=False) as (operator, robot, first, _):
@@ -133,6 +135,7 @@ def test_a_single_path_that_is_cut_delivers_nothing() -> None:
     asyncio.run(story())
 
 
+@pytest.mark.live
 def test_a_question_on_both_paths_is_handled_once_and_answered_over_what_is_left() -> None:
     async def story() -> None:
         async with two_hosts() as (operator, robot, first, second):
@@ -155,6 +158,7 @@ def test_a_question_on_both_paths_is_handled_once_and_answered_over_what_is_left
     asyncio.run(story())
 
 
+@pytest.mark.live
 def test_a_process_is_there_while_either_path_shows_it() -> None:
     async def story() -> None:
         async with two_hosts() as (operator, robot, first, _):
@@ -191,6 +195,7 @@ def test_where_all_are_taken_in_turn_an_overtaken_one_fills_its_gap_once() -> No
     assert taken == [1, 2, 4, 3, 9, 6, 8]
 
 
+@pytest.mark.live
 def test_voice_and_video_come_once_too() -> None:
     async def story() -> None:
         async with two_hosts() as (operator, robot, _, __):
@@ -328,6 +333,7 @@ class PathAppears:
         monkeypatch.setattr(opening, "MOST_RETRY_S", 0.01)
 
 
+@pytest.mark.live
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("missing", [0, 1])
 def test_a_robot_without_one_of_its_paths_answers_at_once_and_takes_the_path_up_later(
@@ -376,6 +382,7 @@ def test_a_robot_without_one_of_its_paths_answers_at_once_and_takes_the_path_up_
     assert "both paths are in use" in caplog.text
 
 
+@pytest.mark.live
 def test_a_path_that_comes_after_the_session_was_closed_is_closed_too(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
