@@ -34,7 +34,7 @@ from common.wire.version import software
 from master.alarms.operator import OperatorAlarms
 from master.alarms.player import TonePlayer
 from master.capture.source import with_extended
-from master.command_rate import CommandRate
+from master.command_rate import CommandRate, RateLog
 from master.config import MasterConfig
 from master.deadman.grip import Grip
 from master.deadman.switches import Switches
@@ -102,6 +102,7 @@ class Master:
         ]
         self._fleet = Fleet(config, session, self._pipeline.skeleton)
         self._rate = CommandRate(config.capture.rate)
+        self._rate_log = RateLog()
         self._pressed = PressedKey()
         self._silence = SilenceWatch()
         self._alarms = OperatorAlarms()
@@ -154,9 +155,12 @@ class Master:
 
     def _follow_lines(self) -> None:
         """Send as many commands a second as the robots' lines allow."""
-        if self._rate.follow(self._fleet.wanted_ms):
+        changed = self._rate.follow(self._fleet.wanted_ms)
+        if changed:
             self._calls.set_decimation(self._rate.decimation)
-            log.info("commands at %s", self._rate.words)
+        line = self._rate_log.line(changed, self._rate.words, monotonic_ns())
+        if line is not None:
+            log.info("%s", line)
 
     async def _sound(self) -> None:
         """Play the tone that is due."""

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from common.clock import NS_PER_S
 from master.capture.rate import AUTO, USUAL_HZ, CaptureRate
+
+LOG_EVERY_NS = 10 * NS_PER_S
 
 
 class CommandRate:
@@ -45,3 +48,23 @@ class CommandRate:
         slowest = f"as the line to {robot} allows" if wanted_ms else "no robot asks for more"
         self.words = f"{self.hz:g} Hz: {slowest}"
         return True
+
+
+class RateLog:
+    """What the log says of the changes: the first at once, and then a line each 10 s at most.
+
+    A robot may ask for another rate in every state.
+    """
+
+    def __init__(self) -> None:
+        self._changes = 0
+        self._said_ns: int | None = None
+
+    def line(self, changed: bool, words: str, now_ns: int) -> str | None:
+        """The line that is due, or None; `words` say which rate is in force. Call it at every look."""
+        self._changes += changed
+        if not self._changes or (self._said_ns is not None and now_ns - self._said_ns < LOG_EVERY_NS):
+            return None
+        often = f" (changed {self._changes} times since the last line)" if self._changes > 1 else ""
+        self._said_ns, self._changes = now_ns, 0
+        return f"commands at {words}{often}"

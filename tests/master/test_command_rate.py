@@ -7,7 +7,7 @@ import pytest
 from common.config.load import load_config
 from common.errors import ConfigError
 from master.capture.rate import CaptureRate
-from master.command_rate import CommandRate
+from master.command_rate import CommandRate, RateLog
 from master.config import MasterConfig
 from tests.master.test_pipeline import EXAMPLES
 
@@ -44,6 +44,19 @@ def test_suits_at_other_rates_come_as_near_as_their_ticks_do(rate_hz: int) -> No
     rate = negotiating(rate_hz)
     rate.follow({"a": 40})
     assert rate.hz == pytest.approx(25.0, rel=0.25)
+
+
+def test_a_robot_that_alternates_its_wish_does_not_flood_the_log() -> None:
+    """It may change it with every look, 12.5 times a second."""
+    rate, log, lines = negotiating(), RateLog(), []
+    for look in range(1000):
+        changed = rate.follow({"a": (20, 80)[look % 2] if 100 <= look < 500 else 80})
+        line = log.line(changed, rate.words, look * 80_000_000)
+        lines += [line] if line is not None else []
+    assert len(lines) == 5
+    assert lines[0] == "commands at 50 Hz: as the line to a allows", "a first change is said at once"
+    assert all("times since the last line" in line for line in lines[1:])
+    assert lines[-1].startswith("commands at 12.5 Hz"), "what holds in the end is said"
 
 
 def test_a_fixed_rate_is_nobody_s_to_change() -> None:
