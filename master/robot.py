@@ -39,8 +39,8 @@ WAITS_S, HELD_S = 0.05, 0.1
 CLOCK_SETTLED, CLOCK_EASY = 40, 2
 """After so many questions the clock of a robot that does not move is asked at every second turn only."""
 CLOCK_QUICK = 3
-"""Questions that follow at once on the first answer of a process. The guard trusts a clock that it has measured
-three times, each time by the question after an answer: at the usual rate a robot waits 0.7 s for that."""
+"""Questions that follow at once on the first answer of a process. The guard trusts a clock that it has
+measured three times, each time by the question after an answer: at the usual rate that takes 0.7 s."""
 MOVES_S = 5.0
 """A robot that followed when it was heard last counts as following for so long."""
 
