@@ -11,6 +11,25 @@ from rich.console import Console
 
 from common.errors import NetworkError, TandemError
 from common.process.runtime import run as run_until_stopped
+from deploy.experiments.trial.options import (
+    Blinded,
+    LinkFile,
+    MaxAge,
+    Motion,
+    Networks,
+    OutageSeconds,
+    PeopleFile,
+    Record,
+    Remote,
+    ReportFolder,
+    Router,
+    Seconds,
+    Seed,
+    Slower,
+    Strategies,
+    Tasks,
+)
+from deploy.experiments.trial.paths.command import paths
 from deploy.report.options import WhichRobot
 
 if TYPE_CHECKING:
@@ -21,100 +40,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(invoke_without_command=True, no_args_is_help=False, rich_markup_mode="markdown")
 
-Tasks = Annotated[
-    Path | None,
-    typer.Option(
-        help="TOML file of what each care task needs, instead of the built-in one.",
-        exists=True,
-        dir_okay=False,
-    ),
-]
-Networks = Annotated[
-    str, typer.Option(help="Network profiles or TOML files of your own, separated by commas, or `all`.")
-]
-Strategies = Annotated[
-    str,
-    typer.Option(help="Tracking strategies: latest, interpolate, predict, separated by commas, or `all`."),
-]
-Seconds = Annotated[float, typer.Option(help="Seconds that are judged in each run.", min=3.0, max=3600.0)]
-OutageSeconds = Annotated[
-    float,
-    typer.Option(
-        help="Seconds of link outage after the judged time, at least 1; 0: no outage.", min=0.0, max=60.0
-    ),
-]
-Motion = Annotated[
-    str | None,
-    typer.Option(
-        help="Motion of the simulated operator, such as sweep; by default the robot profile's own (bottle). "
-        "`capture`: real people, on a virtual clock and over lines of 25 to 300 ms, with no hosts.",
-        show_default=False,
-    ),
-]
-Slower = Annotated[
-    float | None,
-    typer.Option(
-        help="With `--motion capture`: how many times slower than recorded; else 1 and 1.5.",
-        show_default=False, min=0.5, max=10.0,
-    ),
-]  # fmt: skip
-PeopleFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--people",
-        help="With `--motion capture`: recording of people's joint angles (npz); else motion_cmu.npz in the "
-        "folder that TANDEM_DATA names.",
-        show_default=False,
-    ),
-]
-Seed = Annotated[
-    int, typer.Option(help="Random seed for sensor errors, the network and the order of the runs.")
-]
-Router = Annotated[bool, typer.Option("--router", help="Connect master and slave through a router.")]
-MaxAge = Annotated[
-    float,
-    typer.Option(
-        help="Age in seconds at which the guard refuses a command; 0: as much as the network needs.",
-        min=0.0,
-        max=2.0,
-    ),
-]
-Blinded = Annotated[
-    Path | None,
-    typer.Option(
-        help="Key of `tandem session blind`: its transports are run and shown by codes only, in a balanced "
-        "order, until `tandem session unblind`. In place of --transports.",
-        exists=True,
-        dir_okay=False,
-    ),
-]
-Record = Annotated[
-    bool,
-    typer.Option(
-        "--record/--no-record",
-        help="Keep the messages of each run in `recordings/`, from which `tandem trial verify` computes all "
-        "figures again: some 30 kB a second, never more than 500 MB of messages a run.",
-    ),
-]
-ReportFolder = Annotated[
-    Path, typer.Option(help="Folder for the report and the results of every run.", file_okay=False)
-]
-Remote = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ENDPOINT",
-        help="The robot is on another host, where `tandem trial serve` runs: its endpoint, such as "
-        "tcp/ROBOT_HOST:7440. The network is the real one, and `--profiles` only its name in the report.",
-    ),
-]
-LinkFile = Annotated[
-    Path | None,
-    typer.Option(
-        help="With --remote over tls or quic: the master's TOML file whose `[link.tls]` names the keys.",
-        exists=True,
-        dir_okay=False,
-    ),
-]
+app.command()(paths)
 SHORTEST_OUTAGE_S = 1.0
 """A robot need not hold in a shorter outage, so its recovery could not be judged."""
 STOP_S = 30.0
@@ -237,25 +163,6 @@ def serve(
 
     options = ServeOptions(config or example("slave"), listen, address, port, max_age)
     run_until_stopped(lambda stop: serve_trial(options, stop), STOP_S)
-
-
-@app.command()
-def paths(
-    profiles: Networks = "wifi,4g",
-    seconds: Seconds = 10.0,
-    seed: Seed = 1,
-    report: ReportFolder = Path("trial-paths"),
-) -> None:
-    """Compare one path with two (`[link.twin]`): while the first is whole, loses packets, and is cut.
-
-    On a virtual clock, with no hosts and no rights; the first network is the first path. Writes `paths.json`.
-
-    Example: `tandem trial paths --profiles wifi,4g`
-    """
-    from deploy.experiments.trial.cell.choice import choose
-    from deploy.experiments.trial.paths.view import run_paths_trial
-
-    run_paths_trial(choose("--profiles", profiles), seconds, seed, report, Console())
 
 
 @app.command()

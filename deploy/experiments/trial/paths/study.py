@@ -40,7 +40,7 @@ class PathRow:
     paths: int
     holds: int
     followed: float
-    """Share of the time in which the robot followed."""
+    """Share of the time in which the robot followed, whether or not anybody heard of it."""
     missing: float
     """Share of the commands that were not there when they were due."""
     rmse_deg: float | None
@@ -64,38 +64,56 @@ def run(fault: PathFault, first: Profile, second: Profile | None, seconds: float
     world.engage()
     world.run(SETTLE_S)
     guard, due = world.slave.guard, world.slave.traffic.due
-    since = len(world.states)
     held_before, due_before, begun_ns = sum(guard.counters.losses.values()), due.metrics(), world.now_ns
     sent_before = link.sent_bytes
-    _play(world, link, fault, first, seconds)
-    states, found = world.states[since:], due.metrics()
+    watch = _Watch(world)
+    _play(watch, link, fault, first, seconds)
+    found = due.metrics()
     expected = found.expected - due_before.expected
     followed = motion(world.trace.truth(), world.moved(), world.trace.joint_names)
     return PathRow(
         fault,
         1 if second is None else 2,
         holds=sum(guard.counters.losses.values()) - held_before,
-        followed=sum(state.guard == "track" for state in states) / max(1, len(states)),
+        followed=watch.tracked / max(1, watch.looks),
         missing=(found.missing - due_before.missing) / max(1, expected),
         rmse_deg=None if followed is None else followed.rmse_deg,
         kb_s=1e-3 * (link.sent_bytes - sent_before) / to_s(world.now_ns - begun_ns),
     )
 
 
-def _play(world: VirtualWorld, link: TwinLink, fault: PathFault, first: Profile, seconds: float) -> None:
-    world.run(BEFORE_S)
+class _Watch:
+    """Counts at the robot itself: of the states, those of a cut are missing."""
+
+    def __init__(self, world: VirtualWorld) -> None:
+        self.world = world
+        self.looks = self.tracked = 0
+
+    def run(self, seconds: float) -> None:
+        """Go on, and count."""
+        self.world.run(seconds, until=self._look)
+
+    def _look(self) -> bool:
+        self.looks += 1
+        self.tracked += self.world.slave.guard.state == "track"
+        return False
+
+
+def _play(watch: _Watch, link: TwinLink, fault: PathFault, first: Profile, seconds: float) -> None:
+    world = watch.world
+    watch.run(BEFORE_S)
     left_s = seconds - BEFORE_S
     match fault:
         case PathFault.LOSS:
             link.set(lossy(first), world.now_ns)
         case PathFault.CUT:
             link.set(DEAD, world.now_ns)
-            world.run(CUT_S)
+            watch.run(CUT_S)
             link.set(first, world.now_ns)
             left_s -= CUT_S
     while left_s > 0.0:
         step_s = min(AGAIN_S, left_s)
-        world.run(step_s)
+        watch.run(step_s)
         left_s -= step_s
         if world.slave.guard.state == "hold":
             world.ask(Action.ENGAGE)
