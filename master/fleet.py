@@ -88,6 +88,7 @@ class Fleet:
             endpoints=self._endpoints,
             scaling=MotionScaling(operator.scaling, self._skeleton),
             may_claim=may_claim,
+            tapped=self._session.overheard is not None,
         )
 
     async def _serve(self, robot: CommandedRobot) -> None:

@@ -65,8 +65,11 @@ class CommandedRobot:
         endpoints: Sequence[str] = (),
         scaling: MotionScaling | None = None,
         may_claim: Callable[[int, int], bool] = lambda now_ns, lost_ns: True,
+        tapped: bool = False,
     ) -> None:
         """`endpoints`: where this master is reached; shown where two masters have the same operator.
+
+        `tapped`: what is heard is handed to a tap, and its recordings need the robot's own figures too.
 
         `may_claim(now_ns, lost_ns)`: whether the lease may be claimed now; `lost_ns`: when it was lost last.
         """
@@ -95,6 +98,8 @@ class CommandedRobot:
         self._put_keyframe: dict[str, Callable[[bytes], None]] = {}
         self.video = CamerasWatch()
         link.subscribe(STATE, self._on_state)
+        if tapped:
+            link.subscribe(STATISTICS, lambda *_: None)  # the tap overhears it; the master makes no use of it
         link.subscribe_keys(video("*"), self.video.on_payload, in_order=IN_ORDER)
         link.watch_presence(self._on_presence)
 

@@ -29,7 +29,7 @@ from common.wire.messages import (
     Statistics,
 )
 from common.wire.presence import ProcessPresence
-from common.wire.topics import CLOCK, CONTROL, STATE, Topic
+from common.wire.topics import CLOCK, CONTROL, STATE, STATISTICS, Topic
 from master.alarms.situation import RobotSign
 from master.app import Master
 from master.config import MasterConfig
@@ -112,6 +112,7 @@ class FakeLink:
 
 class FakeSession:
     paths = ""
+    overheard: Callable[[str, bytes, int], None] | None = None
 
     def __init__(self, **links: FakeLink) -> None:
         self.links = links
@@ -124,12 +125,12 @@ def solved() -> JointAngleSample:
     return JointAngleSample(16, 1, 2, np.zeros(JOINTS), np.zeros(JOINTS), np.ones(JOINTS, np.bool_))
 
 
-def master_of(**links: FakeLink) -> Master:
+def master_of(tap: Any = None, /, **links: FakeLink) -> Master:
     config = load_config(
         EXAMPLE, MasterConfig, [f"robots={list(links)}", "capture.buses.0.channel='239.0.0.1'"]
     )
     session: Any = FakeSession(**links)
-    return Master(config, session)
+    return Master(config, session, tap=tap)
 
 
 async def served(master: Master, until: Callable[[], bool]) -> None:
@@ -199,6 +200,23 @@ def test_a_state_that_is_garbage_is_counted_at_its_robot() -> None:
     heard = robot.metrics().robot
     assert heard.undecodable == 2
     assert heard.silent is True
+
+
+def test_a_tapped_master_hears_the_robot_s_figures_for_its_recordings() -> None:
+    """`tandem prove` compares the hand's motion with what the robot claims; 1 message a second."""
+    for tap, heard in ((None, False), (Untouched(), True)):
+        link = FakeLink()
+        master_of(tap, a=link)
+        assert (STATISTICS.name in link.hear) is heard
+
+
+class Untouched:
+    """A tap that nobody reads."""
+
+    read = False
+    behind = False
+
+    def put(self, topic: str, payload: bytes, stamp_ns: int) -> None: ...
 
 
 def test_each_round_trip_is_told_once() -> None:

@@ -98,6 +98,7 @@ def test_a_node_on_the_suits_bus_gives_the_figures(fd: bool) -> None:
     assert found[HAND_TO_HAND].found_ms == pytest.approx(1e3 * LATE_S, abs=1.0)
     assert found[SERVO].found_ms == pytest.approx(1e3 * SERVO_S, abs=1.0)
     assert found[ENCODER].found_ms == pytest.approx(0.0, abs=1.0)
+    assert found[HAND_TO_HAND].claimed_ms == slave_metrics().end_to_end_ms.mean
     assert found[HAND_TO_HAND].bound_ms > 1.0  # type: ignore[operator]  # the offset's bound is in it
 
 
