@@ -5,7 +5,6 @@ Pure: bytes in, messages out. The only error it raises is CodecError.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TypeVar, assert_never
 
@@ -16,15 +15,13 @@ from common.metrics.master import MasterMetrics
 from common.metrics.slave import SlaveMetrics
 from common.metrics.tree import from_tree, to_tree
 from common.wire import fields
-from common.wire.fields import MAX_DOUBT, MAX_ITEMS, MAX_NAME, MAX_TEXT
+from common.wire.fields import ANGLE_LIMIT_RAD, MAX_DOUBT, MAX_ITEMS, MAX_NAME, MAX_TEXT, RATE_LIMIT_RAD_S
 from common.wire.messages import (
     Action,
-    BaseAttitude,
     ClockQuery,
     ClockReference,
     ClockReply,
     Command,
-    CommandEcho,
     CommandStamps,
     ControlReply,
     ControlRequest,
@@ -34,6 +31,7 @@ from common.wire.messages import (
     Statistics,
     Truth,
 )
+from common.wire.state_form import pack_state, unpack_head, unpack_state
 
 VERSION = 6
 READABLE = (4, 5, VERSION)
@@ -44,20 +42,8 @@ _ADDED: dict[int, dict[type, tuple[object, ...]]] = {
     6: {RobotState: (0,), StateHead: (0,), Command: (0,)},
 }
 """By version, what stands for its new fields in a message that is older."""
-CONTROL_BYTES = 1100
-"""Of a command, a state, and whatever else the robot is controlled by. With the headers of IPv6, TCP, TLS and
-Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
-_STATE_NUMBERS_BYTES = 200
-"""Of a state's numbers, kind and lengths."""
-MAX_WAY_M, MAX_WAY_S = 100.0, 100.0
-"""Of a hand after the line has died."""
-_NUMBER_BYTES = 9
 MAX_PAYLOAD = 256 * 1024
-ANGLE_LIMIT_RAD = 4 * math.pi
-"""No joint turns twice round; a larger angle is a fault, not a posture."""
-RATE_LIMIT_RAD_S = 100.0
 _POSTURE = (ANGLE_LIMIT_RAD, RATE_LIMIT_RAD_S)
-_ANGLES = (ANGLE_LIMIT_RAD, ANGLE_LIMIT_RAD)
 
 _METRICS: dict[str, type[MasterMetrics | SlaveMetrics]] = {"master": MasterMetrics, "slave": SlaveMetrics}
 """What statistics hold, by the role of the process that sends them."""
@@ -107,13 +93,13 @@ def state_joints(payload: bytes) -> int:
     """How many joints the robot of an encoded state has, for `decode`; 0 where the bytes are no state."""
     try:
         array = _unpack(payload, use_list=False, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
-        # the block of position_rad and setpoint_rad, float32 each (see _unpack_state)
+        # the block of position_rad and setpoint_rad, float32 each (see state_form.py)
         return len(array[2 + 8]) // 8
     except Exception:  # as in decode, which then says what is wrong
         return 0
 
 
-# one pair of functions a message, in the order of messages.py
+# one pair of functions a message, in the order of messages.py; the state's are in state_form.py
 
 
 def _pack_command(m: Command) -> tuple[object, ...]:
@@ -145,102 +131,6 @@ def _unpack_command(f: tuple[object, ...], joints: int) -> Command:
         fields.flag(f[14]),
         fields.count(f[15]),
     )
-
-
-def _pack_state(m: RobotState) -> tuple[object, ...]:
-    e = m.echo
-    echo = None if e is None else (e.sequence, e.put_ns, e.received_ns, e.accepted_ns, e.written_ns)
-    reason = fields.shorten(m.reason, MAX_DOUBT)
-    mask, angles = fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad)
-    torques = fields.pack_torques(m.effort_nm), fields.pack_torques(m.external_nm)
-    named = (m.robot, m.guard, reason, m.operator, *m.resting)
-    clamped = b"" if m.clamped is None else fields.pack_bits(m.clamped)
-    texts = (name.encode("utf-8") for name in named)
-    blocks = (mask, angles, clamped, *(block or b"" for block in torques), *texts)
-    taken = _STATE_NUMBERS_BYTES + sum(map(len, blocks)) + _NUMBER_BYTES * (2 + len(m.blind_m))
-    return (
-        m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
-        m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
-        _pack_base(m.base), m.lease_id, m.instance, m.resting, *torques, m.blind_m, m.blind_s,
-        clamped, m.wanted_period_ms,
-    )  # fmt: skip
-
-
-def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
-    fields.array(f, 23)
-    sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
-    position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
-    return RobotState(
-        robot=fields.text(f[0], MAX_NAME),
-        sequence=sequence,
-        sent_ns=sent_ns,
-        encoder_ns=encoder_ns,
-        guard=fields.text(f[4], MAX_NAME),
-        reason=fields.text(f[5], MAX_TEXT),
-        operator=fields.text(f[6], MAX_NAME),
-        encoder_valid=fields.mask(f[7], joints),
-        position_rad=position_rad,
-        setpoint_rad=setpoint_rad,
-        echo=_unpack_echo(f[9]),
-        master_offset_ns=fields.signed(f[10]),
-        offset_bound_ns=fields.signed(f[11]),
-        faults=fields.texts(f[12], MAX_NAME, MAX_TEXT),
-        base=_unpack_base(f[13]),
-        lease_id=fields.count(f[14]),
-        instance=fields.count(f[15]),
-        resting=fields.names(f[16], MAX_NAME),
-        effort_nm=fields.torques(f[17], joints),
-        external_nm=fields.torques(f[18], joints),
-        blind_m=fields.numbers(f[19], 0.0, MAX_WAY_M),
-        blind_s=fields.number(f[20], 0.0, MAX_WAY_S),
-        clamped=fields.bits(f[21], joints),
-        wanted_period_ms=fields.count(f[22]),
-    )
-
-
-def _unpack_head(f: tuple[object, ...], joints: int) -> StateHead:
-    """Of the joints' blocks only the lengths are looked at: the robot's own kind of body."""
-    fields.array(f, 23)
-    fields.length(f[7], joints)
-    fields.length(f[8], 8 * joints)
-    return StateHead(
-        sequence=fields.count(f[1]),
-        sent_ns=fields.count(f[2]),
-        guard=fields.text(f[4], MAX_NAME),
-        reason=fields.text(f[5], MAX_TEXT),
-        operator=fields.text(f[6], MAX_NAME),
-        echo=_unpack_echo(f[9]),
-        faults=fields.texts(f[12], MAX_NAME, MAX_TEXT),
-        resting=fields.names(f[16], MAX_NAME),
-        lease_id=fields.count(f[14]),
-        instance=fields.count(f[15]),
-        wanted_period_ms=fields.count(f[22]),
-    )
-
-
-def _pack_base(base: BaseAttitude | None) -> tuple[object, ...] | None:
-    if base is None:
-        return None
-    return (base.measured_ns, base.inclination_rad, base.azimuth_rad, base.tool_face_rad, base.tilt_rad)
-
-
-def _unpack_base(value: object) -> BaseAttitude | None:
-    if value is None:
-        return None
-    measured_ns, inclination, azimuth, tool_face, tilt = fields.array(value, 5)
-    return BaseAttitude(
-        fields.count(measured_ns),
-        fields.number(inclination, 0.0, math.pi),
-        None if azimuth is None else fields.number(azimuth, 0.0, math.tau),
-        None if tool_face is None else fields.number(tool_face, 0.0, math.tau),
-        fields.number(tilt, 0.0, math.pi),
-    )
-
-
-def _unpack_echo(value: object) -> CommandEcho | None:
-    if value is None:
-        return None
-    return CommandEcho(*fields.counts(fields.array(value, 5)))
 
 
 def _unpack_control_request(f: tuple[object, ...], _: int) -> ControlRequest:
@@ -331,7 +221,7 @@ def _packed(m: Message) -> tuple[object, ...]:
         case Command():
             return ("command", VERSION, *_pack_command(m))
         case RobotState():
-            return ("state", VERSION, *_pack_state(m))
+            return ("state", VERSION, *pack_state(m))
         case ControlRequest():
             return (
                 "control", VERSION, m.robot, m.action.value, m.operator, m.key, m.clock, m.challenge,
@@ -354,8 +244,8 @@ def _packed(m: Message) -> tuple[object, ...]:
 
 _DECODERS: dict[type, tuple[str, Callable[[tuple[object, ...], int], object]]] = {
     Command: ("command", _unpack_command),
-    RobotState: ("state", _unpack_state),
-    StateHead: ("state", _unpack_head),
+    RobotState: ("state", unpack_state),
+    StateHead: ("state", unpack_head),
     ControlRequest: ("control", _unpack_control_request),
     ControlReply: ("controlled", _unpack_control_reply),
     ClockQuery: ("clock", _unpack_clock_query),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -22,6 +23,9 @@ _OTHERS_BYTES = 30
 """Of a command, which must fit into one packet on every path."""
 MAX_NM = 10_000.0
 """No joint of a humanoid has more torque."""
+ANGLE_LIMIT_RAD = 4 * math.pi
+"""No joint turns twice round; a larger angle is a fault, not a posture."""
+RATE_LIMIT_RAD_S = 100.0
 MAX_ITEMS = 4096
 """Entries of one array or map."""
 _U63 = (1 << 63) - 1

@@ -13,15 +13,12 @@ from common.errors import CodecError
 from common.metrics.master import LeaseHeld
 from common.metrics.tree import to_tree
 from common.wire.codec import (
-    ANGLE_LIMIT_RAD,
-    CONTROL_BYTES,
     MAX_PAYLOAD,
-    RATE_LIMIT_RAD_S,
     VERSION,
     decode,
     encode,
 )
-from common.wire.fields import MAX_DOUBT, MAX_NAME, MAX_TEXT
+from common.wire.fields import ANGLE_LIMIT_RAD, MAX_DOUBT, MAX_NAME, MAX_TEXT, RATE_LIMIT_RAD_S
 from common.wire.messages import (
     Action,
     BaseAttitude,
@@ -38,6 +35,7 @@ from common.wire.messages import (
     Truth,
 )
 from common.wire.numbering import number_of
+from common.wire.state_form import CONTROL_BYTES
 from tests.published import commanded, master_metrics, slave_metrics
 
 counts = st.integers(0, 2**63 - 1)

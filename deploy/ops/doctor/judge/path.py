@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.wire.codec import CONTROL_BYTES
+from common.wire.state_form import CONTROL_BYTES
 from deploy.ops.doctor.judge.finding import Finding, fail, ok, warn
 from deploy.ops.doctor.read.path import SIZES, PathFacts
 
