@@ -11,7 +11,7 @@ from rich.console import Console
 
 from common.errors import NetworkError, TandemError
 from common.process.runtime import run as run_until_stopped
-from deploy.experiments.trial.options import (
+from deploy.experiments.trial.cell.options import (
     Blinded,
     LinkFile,
     MaxAge,

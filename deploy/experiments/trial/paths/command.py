@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from deploy.experiments.trial.options import Networks, ReportFolder, Seed
+from deploy.experiments.trial.cell.options import Networks, ReportFolder, Seed
 
 SHORTEST_S = 5.0
 """Less time would end before the operator, after the cut, has engaged again."""
