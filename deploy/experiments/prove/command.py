@@ -60,8 +60,20 @@ def prove_motion(
         Path | None,
         typer.Option(help="Instead of a recording: be led through one, at the master's `[tap] socket`."),
     ] = None,
+    poll: Annotated[
+        Path | None,
+        typer.Option(
+            help="At the robot: poll the node on a bus there, never the drives', until Ctrl-C; TOML file "
+            "with [bus].",
+            exists=True,
+            dir_okay=False,
+        ),
+    ] = None,
     out: Annotated[
-        Path, typer.Option(help="With --lead: the recording to write.", dir_okay=False, callback=in_a_folder)
+        Path,
+        typer.Option(
+            help="With --lead or --poll: the recording to write.", dir_okay=False, callback=in_a_folder
+        ),
     ] = Path("proof.mcap"),
     seconds: Annotated[
         float, typer.Option(help="How long the hand moves, with --lead or --simulate.", min=14.0)
@@ -85,6 +97,9 @@ def prove_motion(
 
     Example: `tandem prove morning.mcap --hand right_hand --node 100`
     """
+    if poll is not None:
+        _polled(poll, out, node)
+        return
     if simulate_over is not None:
         # here: MuJoCo and scipy would cost each `tandem` command their time and memory
         from deploy.experiments.prove.simulated import judge, simulate
@@ -131,6 +146,21 @@ def _led(tap: Path, out: Path, hand: str, node: int, seconds: float) -> list[Pro
             f"interrupted before the hand had moved enough; `tandem prove {out}` judges what is in it"
         )
     return _of_recording([out], hand, node, None)
+
+
+def _polled(file: Path, out: Path, node: int) -> None:
+    from common.config.load import load_config
+    from deploy.experiments.prove.poll import PollConfig
+    from deploy.experiments.prove.poll import poll as poll_node
+
+    config, console = load_config(file, PollConfig), Console(stderr=True)
+    with console.status("polling; Ctrl-C ends it") as status:
+
+        def show(answers: int) -> None:
+            status.update(f"{answers} answers a second, of {config.rate_hz}; Ctrl-C ends it")
+
+        run_until_stopped(lambda stop: poll_node(config, node, out, stop, show))
+    console.print(f"recorded into {out}", highlight=False, soft_wrap=True)
 
 
 def _planted(words: Sequence[str]) -> dict[str, int]:
