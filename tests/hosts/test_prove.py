@@ -31,11 +31,12 @@ from deploy.measure.proof import ENCODER, HAND_TO_HAND, HAND_TO_SETPOINT, SERVO
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.live, pytest.mark.timeout(400), pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(900), pytest.mark.usefixtures("default_signals")]
 
 SECONDS = "40"
 """Ten segments: a busy host leaves gaps in some, which then do not count."""
-MOST_S = 150.0
+MOST_S = 400.0
+"""Against a hang: on a busy host the figures alone take minutes."""
 LATE_MS = 40
 
 
