@@ -91,6 +91,8 @@ class PageSockets:
                 return f"more than {REQUESTS_PER_S:g} requests a second"
             elif kind == "shown":
                 page.saw_code(body, now_ns)
+            elif kind == "look":
+                page.look(body.get("camera"))
             elif kind == "jpeg":
                 if words := self._hub.want_jpeg(page):
                     page.say({"kind": "answer", "to": "jpeg", "done": False, "text": words})

@@ -15,6 +15,7 @@ from deploy.console.model.glass import GlassWatch, read_shown
 from deploy.console.model.pictures import picture_header
 from deploy.console.model.robot import RobotModel
 from deploy.console.outbox import Outbox
+from deploy.console.picture_choice import PictureChoice
 from deploy.console.session import Person, RateLimit
 
 MOST = 8
@@ -64,6 +65,7 @@ class OpenPage:
         """Fell silent while it held: must release before it can hold again."""
         self.asked_stop = False
         """Whether it asked for a stop of the robot that it shows."""
+        self._choice = PictureChoice()
         self._stop_told: Mapping[str, object] | None = None
         self._first: list[str] = []
         self._ready = asyncio.Event()
@@ -95,7 +97,7 @@ class OpenPage:
 
         False: this page cannot show it, and needs one that stands alone.
         """
-        if not self.person.role.sees:
+        if not self.person.role.sees or not self._choice.wants(camera, frame, monotonic_ns()):
             return True
 
         def make(number: int) -> bytes:
@@ -112,6 +114,11 @@ class OpenPage:
             shown = self.outbox.offer_in_order(f"picture {camera}", frame.number, make, begins)
         self._ready.set()
         return shown
+
+    def look(self, camera: object) -> None:
+        """The page shows this camera large; None: it shows none at all. Anything else changes nothing."""
+        if camera is None or isinstance(camera, str):
+            self._choice.at(camera)
 
     def tell_stop(self, now_ns: int) -> None:
         """What became of the stop that this page asked for, where no view tells it: not who else asked."""
@@ -147,6 +154,7 @@ class OpenPage:
         self.asked_stop, self._stop_told = False, None
         self.outbox.clear()
         self.glass.clear()
+        self._choice = PictureChoice()
 
     async def write(self) -> None:
         """Send until cancelled. A socket that stands still stops only this page's own writer."""

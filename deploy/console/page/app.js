@@ -60,6 +60,7 @@ const KEYS = {
 
 function keyDown(event) {
   const writes = event.target instanceof HTMLInputElement;
+  const chooses = event.target instanceof HTMLSelectElement;
   if (event.key === "Escape" || (event.key === " " && !writes)) {
     event.preventDefault();
     event.stopPropagation();
@@ -72,6 +73,8 @@ function keyDown(event) {
     if (!event.repeat) hold(true);
     return;
   }
+  const plain = !writes && !chooses && !event.shiftKey && !event.ctrlKey && !event.altKey && !event.metaKey;
+  if (plain && /^[1-9]$/.test(event.key)) parts.cameras?.chooseAt(Number(event.key) - 1);
   if (!KEYS[event.key] || event.ctrlKey || event.altKey || event.metaKey) return;
   event.preventDefault();
   if (!event.repeat) KEYS[event.key].down(event);
@@ -183,6 +186,7 @@ async function hello(message) {
   if (message.may?.hold) link.letGo();
   show();
   if (link.quiet) return;
+  looks(parts.cameras?.large);
   if (!seen.setup || other_console || other_robot) await prepare(message.robot);
 }
 
@@ -191,6 +195,7 @@ async function prepare(robot) {
   parts.preparing = robot;
   const found = await askSetup(robot);
   parts.preparing = null;
+  const same = seen.setup?.robot === found.robot;
   seen.setup = found;
   seen.holdKey = found.deadman_key ?? "F9";
   document.body.classList.toggle("replay", Boolean(found.replay));
@@ -201,7 +206,7 @@ async function prepare(robot) {
   $("hold-key").textContent = seen.holdKey;
   parts.figure = found.nodes?.length && $("figure") ? new BodyFigure($("figure"), found.nodes) : null;
   parts.table = $("joints") ? new JointTable($("joints"), found.joints, engineer) : null;
-  parts.cameras = $("cameras") ? new Cameras($("cameras"), found.cameras ?? []) : null;
+  if (!same) parts.cameras = $("cameras") ? new Cameras($("cameras"), found.cameras ?? [], looks) : null;
   cameras(Object.keys(seen.view?.video ?? {}));
   if (parts.more) parts.more.prepare(found);
   if (seen.facts) facts(seen.facts);
@@ -267,9 +272,12 @@ function facts(message) {
 
 /** Cameras that are heard of later get their place too. */
 function cameras(names) {
-  if (parts.cameras && names.some((name) => !parts.cameras.has(name))) {
-    parts.cameras = new Cameras($("cameras"), [...new Set([...parts.cameras.names(), ...names])]);
-  }
+  parts.cameras?.add(names);
+}
+
+/** The console sends all pictures of the camera that is shown large, fewer of the others; none where none is shown. */
+function looks(camera) {
+  if (camera || !$("cameras")) link.send({ kind: "look", camera: camera ?? null });
 }
 
 function gotPicture(header) {

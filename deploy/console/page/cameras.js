@@ -1,4 +1,5 @@
-// The pictures of the patient's home, and over them the robot that will be.
+// The pictures of the patient's home: one large, those of the other cameras beside it. Over the large one the robot
+// that will be.
 import { make } from "./facts.js";
 import { bars } from "./lens.js";
 import { picture } from "./state.js";
@@ -36,34 +37,83 @@ function trace(will, canvas, found) {
   }
 }
 
+/** The head first, for it is what the operator looks through; then by name, so that a key means the same each time. */
+const inOrder = (a, b) => (b === "head") - (a === "head") || (a < b ? -1 : 1);
+
 /** The pictures of the patient's home, each with its own age: one that freezes does not freeze the others. */
 export class Cameras {
-  constructor(element, names) {
+  /** `looks(name)` is called with the camera whose picture is large now. */
+  constructor(element, names, looks) {
+    this.element = element;
+    this.looks = looks;
     this.cameras = new Map();
-    element.replaceChildren(...(names.length ? names : [""]).map((name) => {
-      const box = make("div", "", { class: "camera none" });
-      const canvas = make("canvas", "", { role: "img", "aria-label": t("picture.of", { camera: nameOf(name) }) });
-      const over = make("p", "", { class: "over" });
-      const will = make("canvas", "", { class: "will", "aria-hidden": "true" });
-      box.append(canvas, will, over);
-      this.cameras.set(name, { box, over, canvas, will, header: null });
-      return box;
-    }));
+    this.large = "";
+    this.add(names.length ? names : [""]);
+  }
+
+  /** Give a place to cameras that have none; those that have one keep their picture. */
+  add(names) {
+    const fresh = names.filter((name) => !this.cameras.has(name));
+    if (!fresh.length) return;
+    this.cameras.delete("");
+    for (const name of fresh) this.cameras.set(name, this.place(name));
+    this.cameras = new Map([...this.cameras].sort(([a], [b]) => inOrder(a, b)));
+    this.element.replaceChildren(...[...this.cameras.values()].map(({ box }) => box));
+    this.show(this.chosen ? this.large : this.names()[0] ?? "");
     this.speak();
   }
 
-  speak() {
-    for (const [name, { over, header }] of this.cameras) {
-      if (!header) over.textContent = t(name ? "picture.none" : "picture.no_camera");
-    }
+  place(name) {
+    const box = make("div", "", { class: "camera none" });
+    const canvas = make("canvas", "", { role: "img" });
+    const over = make("p", "", { class: "over" });
+    const will = make("canvas", "", { class: "will", "aria-hidden": "true" });
+    const note = make("p", "", { class: "lens-note" });
+    const pick = make("button", "", { type: "button", class: "pick" });
+    box.append(canvas, will, over, note, pick);
+    box.addEventListener("click", () => this.choose(name));
+    return { box, over, canvas, will, note, pick, header: null };
   }
 
-  has(name) {
-    return this.cameras.has(name);
+  speak() {
+    [...this.cameras].forEach(([name, { over, header, canvas, pick }], i) => {
+      canvas.setAttribute("aria-label", t("picture.of", { camera: nameOf(name) }));
+      if (!header) over.textContent = t(name ? "picture.none" : "picture.no_camera");
+      pick.id = `camera-${i + 1}`;
+      pick.hidden = this.cameras.size < 2;
+      pick.title = t("picture.pick", { camera: nameOf(name) });
+      pick.replaceChildren(make("kbd", String(i + 1)), make("span", nameOf(name)));
+    });
   }
 
   names() {
     return [...this.cameras.keys()].filter(Boolean);
+  }
+
+  /** A person wants this camera's picture large. */
+  choose(name) {
+    if (!name || !this.cameras.has(name)) return;
+    this.chosen = true;
+    if (name !== this.large) this.show(name);
+  }
+
+  /** As the keys 1, 2, 3 say it. */
+  chooseAt(place) {
+    this.choose(this.names()[place]);
+  }
+
+  show(name) {
+    const other = name !== this.large;
+    this.large = name;
+    this.element.dataset.beside = this.cameras.size - 1;
+    for (const [each, { box, pick, will, note }] of this.cameras) {
+      box.classList.toggle("large", each === name);
+      pick.setAttribute("aria-pressed", each === name);
+      if (each === name) continue;
+      will.width = will.height = 1;
+      note.textContent = "";
+    }
+    if (other) this.looks(name);
   }
 
   /** Another robot is shown: none of its pictures came yet. */
@@ -92,31 +142,35 @@ export class Cameras {
   }
 
   /**
-   * Over each picture that is not old, of a camera whose lens is known: the robot where it is by now. `posture`: what
-   * `bars` takes; null where it is not foretold.
+   * Over the large picture, if it is not old and its camera's lens is known: the robot where it is by now. `posture`:
+   * what `bars` takes; null where it is not foretold.
    */
   foretell(lenses, links, posture) {
-    for (const [name, { box, canvas, will, header }] of this.cameras) {
-      const lens = header && !box.classList.contains("stale") ? lenses?.[name] : null;
-      const found = lens && posture ? bars(lens, links, posture, canvas.width, canvas.height) : [];
-      if (found.length) trace(will, canvas, found);
-      else if (will.width > 1) will.width = will.height = 1;
-    }
+    const camera = this.cameras.get(this.large);
+    if (!camera) return;
+    const { box, canvas, will, note, header } = camera;
+    const drawn = header && posture && !box.classList.contains("stale");
+    const lens = lenses?.[this.large];
+    const found = drawn && lens ? bars(lens, links, posture, canvas.width, canvas.height) : [];
+    if (found.length) trace(will, canvas, found);
+    else if (will.width > 1) will.width = will.height = 1;
+    const words = drawn && lenses && !lens ? t("picture.no_lens") : "";
+    if (note.textContent !== words) note.textContent = words;
   }
 
-  /** Say how old each picture is now, and in `line` how old the oldest is. */
+  /** Say how old each picture is now, and in `line` how old the large one is. */
   tick(line, page_ms, stale_s) {
-    let oldest = null;
-    for (const { box, over, header } of this.cameras.values()) {
+    let large = null;
+    for (const [name, { box, over, header }] of this.cameras) {
       if (!header) continue;
       const found = picture(header, page_ms, (performance.now() - header.arrived_ms) / 1000, stale_s);
       box.classList.remove("none");
       box.classList.toggle("stale", found.stale);
       if (found.stale) over.textContent = t(found.known ? "picture.stale" : "picture.stale_least", { age: found.age_s.toFixed(1) });
-      if (!oldest || found.age_s > oldest.age_s) oldest = found;
+      if (name === this.large) large = found;
     }
-    if (!oldest || !line) return;
-    const age = { age: oldest.age_s.toFixed(1), ms: (oldest.age_s * 1000).toFixed(0), bound: Math.ceil(oldest.bound_ms ?? 0) };
-    line.textContent = t(!oldest.known ? "picture.age_unknown" : oldest.stale ? "picture.old" : "picture.age", age);
+    if (!line) return;
+    const age = large && { age: large.age_s.toFixed(1), ms: (large.age_s * 1000).toFixed(0), bound: Math.ceil(large.bound_ms ?? 0) };
+    line.textContent = large ? t(!large.known ? "picture.age_unknown" : large.stale ? "picture.old" : "picture.age", age) : "";
   }
 }

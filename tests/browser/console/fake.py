@@ -58,6 +58,10 @@ class FakeConsole:
         """Makes (bytes, alone) of pixels and whether the picture must stand alone: they are H.264."""
         self.loses = 0
         """So many of the next pictures do not arrive."""
+        self.beside: tuple[str, ...] = ()
+        """Cameras beside `head`."""
+        self.frozen: tuple[str, ...] = ()
+        """Cameras of which no picture comes any more."""
         self.coded = False
         """Each picture shows the time of this host as a code."""
         self.reports: list[dict[str, str]] = []
@@ -230,8 +234,10 @@ class FakeConsole:
                 n, facts_turn = n + 1, turn + 25
                 await socket.send_json(self._facts(n))
             if turn % 2 and self.pictures:
-                n += 1
-                await self._send_picture(socket, n)
+                for camera in ("head", *self.beside):
+                    if camera not in self.frozen:
+                        n += 1
+                        await self._send_picture(socket, n, camera)
 
     def _view(self, n: int) -> dict[str, Any]:
         now_s = 0.0 if self.still else time.monotonic()
@@ -278,9 +284,9 @@ class FakeConsole:
             )
         return {"nodes": nodes}
 
-    async def _send_picture(self, socket: web.WebSocketResponse, n: int) -> None:
+    async def _send_picture(self, socket: web.WebSocketResponse, n: int, camera: str) -> None:
         if self.h264 is None:
-            await socket.send_bytes(self._frame(n))
+            await socket.send_bytes(self._frame(n, camera))
             return
         number, self._number = self._number + 1, self._number + 1
         body, alone = self.h264(_pixels(self.coded), self._wants_key)
@@ -294,8 +300,8 @@ class FakeConsole:
         header = json.dumps({"kind": "picture", "n": n, **about}).encode()
         await socket.send_bytes(struct.pack("<I", len(header)) + header + body)
 
-    def _frame(self, n: int) -> bytes:
-        about = {"camera": "head", "number": n, "age_ms": 92.1, "bound_ms": 1.0, "width": 320, "height": 240}
+    def _frame(self, n: int, camera: str) -> bytes:
+        about = {"camera": camera, "number": n, "age_ms": 92.1, "bound_ms": 1.0, "width": 320, "height": 240}
         header = json.dumps({"kind": "picture", "n": n, **about}).encode()
         return struct.pack("<I", len(header)) + header + (self.picture or _jpeg(self.coded))
 
