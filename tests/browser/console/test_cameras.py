@@ -65,14 +65,13 @@ def test_one_is_large_and_key_click_and_enter_choose_another(page: Any, fake: Fa
 def test_one_that_freezes_is_marked_alone_and_the_others_go_on(page: Any, fake: FakeConsole) -> None:
     three(page, fake)
     fake.frozen = ("head",)
-    until(page, lambda: frames(page)["head"]["stale"])
-    over, frame = (page.locator(each).bounding_box() for each in (".large .over", ".camera.large"))
-    assert over == frame
+    over, frame = page.locator(".camera.large.stale .over"), page.locator(".camera.large")
+    until(page, lambda: over.count() == 1 and over.bounding_box() == frame.bounding_box())
     assert not any(frames(page)[name]["stale"] for name in ("hand", "room"))
     page.keyboard.press("3")
     fake.frozen = ("head", "hand")
     until(page, lambda: frames(page)["hand"]["stale"])
-    assert page.locator(".camera.stale:not(.large) .over:visible").count() == 2
+    until(page, lambda: page.locator(".camera.stale:not(.large) .over:visible").count() == 2)
     assert not frames(page)["room"]["stale"]
     assert "ms old" in page.inner_text("#home-age")
     page.keyboard.press("1")
@@ -121,7 +120,7 @@ def test_three_are_readable(page: Any, fake: FakeConsole, language: str, size: t
     assert page.evaluate(OVERFLOWS) == []
     fake.frozen = ("head", "hand")
     until(page, lambda: page.locator(".camera.stale").count() == 2)
-    assert page.inner_text(".large .lens-note") == ""
+    until(page, lambda: page.inner_text(".large .lens-note") == "")
     assert page.evaluate(OVERFLOWS) == []
     assert page.evaluate(COVERED) == 0
     found = axe.Axe().run(page).response["violations"]
