@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -25,6 +25,8 @@ RENAMED = {
 """Keys that had another name, old to new: an old one is refused, and the new one named."""
 
 
+FROM_FILE = "@"
+"""Before the name of a file of changes."""
 CHOOSE = ("source", "shape")
 """The keys by which a section is one of several kinds."""
 REST = "others"
@@ -34,7 +36,8 @@ REST = "others"
 def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -> Model:
     """Read and check a TOML file before anything is opened.
 
-    `overrides` are `section.key=value` with the value in TOML, and win over the file.
+    `overrides` are `section.key=value` with the value in TOML, and win over the file; `@FILE` stands for
+    the lines of a file, one change each, so that a list of processes does not show them.
     Raises ConfigError, one line a mistake.
     """
     try:
@@ -45,9 +48,23 @@ def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -
         raise _mistake(path, "file", path.name, f"UTF-8 text ({error.reason})") from None
     except tomllib.TOMLDecodeError as error:
         raise _mistake(path, "file", path.name, f"valid TOML ({error})") from None
-    for change in overrides:
+    for change in _changes(overrides):
         override(table, change)
     return check_config(path, table, model)
+
+
+def _changes(overrides: Sequence[str]) -> Iterator[str]:
+    """The changes, with those of files in place of the files' names. Raises ConfigError."""
+    for text in overrides:
+        if not text.startswith(FROM_FILE):
+            yield text
+            continue
+        named = Path(text.removeprefix(FROM_FILE))
+        try:
+            yield from (line for line in named.read_text("utf-8").splitlines() if line.strip())
+        except (OSError, UnicodeDecodeError):
+            expected = f"section.key=value, or {FROM_FILE}FILE: a readable text of one change a line"
+            raise _mistake("--set", "--set", text, expected) from None
 
 
 def check_config(path: Path, table: Mapping[str, object], model: type[Model]) -> Model:

@@ -15,6 +15,7 @@ from typing import TypeVar
 
 import psutil
 
+from common.config.load import FROM_FILE
 from common.errors import TandemError
 from common.metrics.tree import from_tree
 from deploy.harness.spawn import Spawned
@@ -55,10 +56,15 @@ class Child:
         tandem: Sequence[str] = (sys.executable, "-m", "deploy"),
         name: str | None = None,
     ) -> None:
-        """`name`: of one among several with the same role."""
+        """`name`: of one among several with the same role.
+
+        Changes of its file never stand in its command line: `ps` would name the transport of a blinded trial.
+        """
         self.role = role
         self.name = name or role
         self._tandem = tandem
+        self.changes = folder / f"{self.name}.changes"
+        """Of its file, for this run."""
         self.log = folder / f"{self.name}.log"
         self.metrics_file = folder / f"{self.name}.metrics.json"
         self._environment = environment_of_a_run(folder, os.environ)
@@ -78,8 +84,9 @@ class Child:
         `options`: of its command line, besides.
         """
         arguments = [str(config), "--metrics", str(self.metrics_file), *options]
-        for override in overrides:
-            arguments += ["--set", override]
+        if overrides:
+            self.changes.write_text("\n".join(overrides) + "\n", "utf-8")
+            arguments += ["--set", f"{FROM_FILE}{self.changes}"]
         await self.run(arguments, through)
 
     async def run(self, arguments: Sequence[str], through: Sequence[str] = ()) -> None:

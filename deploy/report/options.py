@@ -24,7 +24,8 @@ Overrides = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Replace one key of the file for this run, as in `--set 'robot=\"robot-2\"'`; repeat for more.",
+        help="Replace one key of the file for this run, as in `--set 'robot=\"robot-2\"'`; repeat for more. "
+        "`@FILE`: all changes in a file, one a line.",
     ),
 ]
 MetricsFile = Annotated[

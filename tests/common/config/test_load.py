@@ -106,9 +106,17 @@ def test_one_key_may_be_set_beside_the_file(tmp_path: Path) -> None:
     assert (config.rate_hz, config.link.listen, config.nodes[0].id) == (50.0, ["ws/localhost:80"], 9)
 
 
+def test_a_file_of_changes_stands_for_its_lines(tmp_path: Path) -> None:
+    changes = tmp_path / "run.changes"
+    changes.write_text('rate_hz=50.0\n\nlink.listen=["ws/localhost:80"]\n', "utf-8")
+    config = load(tmp_path, 'robot = "r"\n', f"@{changes}", 'robot="s"')
+    assert (config.rate_hz, config.link.listen, config.robot) == (50.0, ["ws/localhost:80"], "s")
+
+
 @pytest.mark.parametrize(
     ("override", "line"),
     [
+        ("@none.changes", "--set: --set = '@none.changes': expected section.key=value, or @FILE: a readable"),
         ("rate_hz", "--set: --set = 'rate_hz': expected section.key=value"),
         ("robot=r", "--set: robot = 'r': expected a TOML value; texts need quotes, as in"),
         ("robot.name=5", "--set: robot.name = '5': expected"),

@@ -72,8 +72,9 @@ def test_it_gets_role_file_metrics_and_overrides(tmp_path: Path) -> None:
         await ended(child)
         metrics = ["--metrics", str(tmp_path / "master.metrics.json")]
         assert json.loads(child.metrics_file.read_text("utf-8")) == {
-            "argv": ["master", "some.toml", *metrics, "--set", 'robot="r"']
+            "argv": ["master", "some.toml", *metrics, "--set", f"@{tmp_path / 'master.changes'}"]
         }
+        assert (tmp_path / "master.changes").read_text("utf-8") == 'robot="r"\n'
         assert await child.stop() == 0
 
     run(tmp_path, "here(); open(sys.argv[5], 'w').write(json.dumps({'argv': sys.argv[2:]}))", test)
