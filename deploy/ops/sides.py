@@ -46,6 +46,11 @@ def master(
     connect = connect_of(blinded, condition)
     with transports_hidden():
         checked = load_config(config, MasterConfig, [*(set_ or ()), f"link.connect={json.dumps(connect)}"])
+        if checked.link.listen:
+            raise TandemError(
+                f"{config}: link.listen: expected [] with --blinded: a robot could connect there over "
+                "another transport than the condition's"
+            )
         if checked.link.twin is not None:  # metrics and page name the path that is missing, by its endpoints
             raise TandemError(
                 f"{config}: link.twin: expected no second path with --blinded, as it is not the condition's: "

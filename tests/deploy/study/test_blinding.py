@@ -194,6 +194,18 @@ def test_a_blinded_master_takes_no_second_path(drawn: tuple[Path, str], tmp_path
         tandem("master", file, "--blinded", drawn[0], "--condition", code)
 
 
+def test_a_blinded_master_listens_nowhere(drawn: tuple[Path, str], tmp_path: Path) -> None:
+    """A robot that connects there would run over that transport, not over the condition's."""
+    conditions = read_key(drawn[0]).conditions
+    code = next(code for code, condition in conditions.items() if condition.transport == "tcp")
+    with pytest.raises(TandemError, match=r"link\.listen: expected \[\] with --blinded") as refused:
+        tandem(
+            "master", example("master"), "--blinded", drawn[0], "--condition", code,
+            "--set", 'link.listen=["udp/127.0.0.1:7499"]',
+        )  # fmt: skip
+    assert "udp" not in str(refused.value)
+
+
 @pytest.mark.parametrize(
     ("text", "hidden"),
     [
