@@ -174,7 +174,8 @@ def verify(
 
     The recordings hold everything that this needs, so it works on any machine. A seal (`tandem session
     seal`) is verified first. It ends with status 1 and names the bytes, lines and figures that differ.
-    Without recordings, the tables are computed from the cells.
+    Without recordings, the tables of a sealed trial are computed from its cells; one that has neither
+    recordings nor a seal proves nothing, which is status 1 too.
 
     Example: `tandem trial verify trial`
     """
@@ -194,6 +195,12 @@ def verify(
     if changed or checked.differences:
         count = len(changed) + len(checked.differences)
         raise TandemError(f"{folder}: {count} things are not as sealed, or not what the {given}")
+    if not sealed and not checked.recomputed:
+        raise TandemError(
+            f"{folder}: nothing proves its cells: no recording was computed, and there is no seal; "
+            "the tables are what the cells give. Run the trial with --record, or seal it by "
+            "`tandem session seal`"
+        )
     words = "the seal is whole" if sealed else "it is not sealed"
     from_files = f"{checked.recomputed} of {checked.cells} cells were computed from their recordings"
     typer.echo(f"{folder}: every table is what the {given}; {from_files}; {words}")

@@ -24,9 +24,17 @@ def copy(whole: Path, tmp_path: Path) -> Path:
 
 def test_every_table_is_what_the_cells_give(copy: Path) -> None:
     assert differences(Folder(copy)).differences == []
+    seal(copy)
     shown = CliRunner().invoke(cli.app, ["trial", "verify", str(copy)])
     assert shown.exit_code == 0, shown.output
-    assert "it is not sealed" in shown.output
+    assert "every table is what the cells give; 0 of" in shown.output
+
+
+def test_cells_alone_prove_nothing(copy: Path) -> None:
+    """Whoever changes a cell, and writes the report again, leaves nothing to be found."""
+    shown = CliRunner().invoke(cli.app, ["trial", "verify", str(copy)])
+    assert isinstance(shown.exception, TandemError)
+    assert "no recording was computed, and there is no seal" in str(shown.exception)
 
 
 def test_a_changed_figure_of_the_report_is_named(copy: Path) -> None:
