@@ -52,13 +52,15 @@ def collisions(
     from common.config.load import load_config
     from deploy.examples.profiles import NURSING, example
     from deploy.experiments.collisions.progress import RunProgress, as_tree
+    from deploy.harness.code_state import code_state
     from slave.config import SlaveConfig
 
     console = Console()
     path = file or example("slave", NURSING)
     load_config(path, SlaveConfig)  # a mistake is told here, not by a worker
     robot = hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-    progress = RunProgress({"robot": robot, "seed": seed, "damper": damper, "part": PART}, resume)
+    run = {"code": code_state(), "robot": robot, "seed": seed, "damper": damper, "part": PART}
+    progress = RunProgress(run, resume)
     progress.resume()
     parts = [part for part in range(-(-motions // PART)) if part not in progress.done]
     sizes = [(part, min(PART, motions - part * PART)) for part in parts]

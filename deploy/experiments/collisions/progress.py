@@ -38,7 +38,7 @@ class RunProgress:
 
     def _refused(self, why: str) -> ConfigError:
         assert self._file is not None
-        expected = "the file of a run with the same settings, or a new name"
+        expected = "the file of a run with the same settings by the same code, or a new name"
         return ConfigError(self._file, [ConfigMistake("--resume", why, expected)])
 
     def add(self, part: int, found: CollisionReport) -> None:

@@ -13,6 +13,7 @@ from rich.table import Table
 from deploy.experiments.contact.flight import Flight
 from deploy.experiments.contact.flights import LOADS, Flights, fly, motions_of
 from deploy.experiments.contact.progress import FlightProgress
+from deploy.harness.code_state import code_state
 from deploy.measure.verdict import Verdict, at_most
 from deploy.report.tables import number, plain_table
 
@@ -28,11 +29,11 @@ def follow_for(
     """Follow all motions for so long with each load: tables, JSON tree, verdicts.
 
     `resume`: the file of what is done. Raises RecordingError where the person's file cannot be read, and
-    ConfigError where that file is of another run.
+    ConfigError where that file is of another run or by other code.
     """
     motions, seconds = motions_of(person), 3600.0 * hours
     whose = None if person is None else hashlib.sha256(person.read_bytes()).hexdigest()[:16]
-    done = FlightProgress({"hours": hours, "seed": seed, "person": whose}, resume)
+    done = FlightProgress({"code": code_state(), "hours": hours, "seed": seed, "person": whose}, resume)
     done.resume()
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("through the air", total=seconds * len(LOADS))

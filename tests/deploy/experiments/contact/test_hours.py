@@ -107,6 +107,22 @@ def test_table_and_tree_tell_each(short: Flights) -> None:
     assert {one["readings"] for one in tree["flights"]} == set(READINGS)
 
 
+def test_a_file_that_other_code_began_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(
+        hours, "motions_of", lambda person: {"still": lambda t_s: (np.zeros(25), np.zeros(25))}
+    )
+    file = tmp_path / "hour.json"
+
+    def go_on() -> None:
+        hours.follow_for(0.0004, None, 1, Console(file=StringIO()), resume=file)
+
+    go_on()
+    go_on()
+    monkeypatch.setattr(hours, "code_state", lambda: "0123456789abcdef")
+    with pytest.raises(ConfigError, match=r"has code '[0-9a-f]{16}', and this run has '0123456789abcdef'"):
+        go_on()
+
+
 def test_people_are_followed_without_a_false_stop(recordings_folder: Path) -> None:
     found = fly({"person": motions_of(recordings_folder / "motion_cmu.npz")["person"]}, 15.0, seed=1)
     assert all(verdict.outcome is Outcome.PASSED for verdict in hours.judge_flights(found))
