@@ -35,6 +35,8 @@ class NodeRecording:
     """(T, 3) of a marker, in the file's own world frame; None where the file has none."""
     start_s: float = 0.0
     """Time of the first row, by the file's own clock."""
+    assumed: frozenset[str] = frozenset()
+    """Quantities (acc, gyr, mag) of which the file tells no unit: taken as SI."""
 
     @property
     def duration_s(self) -> float:

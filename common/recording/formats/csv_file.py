@@ -51,12 +51,18 @@ def of_table(path: Path, table: TextTable, options: ReadOptions, name: str) -> R
     notes = list(table.notes)
     time_s, stamps = _times(str(path), table, found, options, notes)
     units: dict[str, dict[str, SensorSeries]] = {}
+    assumed: dict[str, set[str]] = {}
     for (node, quantity), (columns, unit) in assigned.items():
         values = np.stack([table.column(column) for column in columns], axis=-1)
         values = values * _scale(str(path), (node or name, quantity), (columns, unit), options, notes)
         units.setdefault(node or name, {})[quantity] = SensorSeries(values, time_s, stamps)
-    rate_hz = options.rate_hz
-    return ReadFile(tuple(UnitSamples(unit, s, rate_hz) for unit, s in units.items()), tuple(notes))
+        if quantity in SI and unit is None and quantity not in options.units:
+            assumed.setdefault(node or name, set()).add(quantity)
+    read = tuple(
+        UnitSamples(unit, series, options.rate_hz, assumed=frozenset(assumed.get(unit, ())))
+        for unit, series in units.items()
+    )
+    return ReadFile(read, tuple(notes))
 
 
 def _assigned(where: str, found: Sequence[ColumnMeaning]) -> Assigned:

@@ -66,6 +66,7 @@ def even_node(path: Path, unit: UnitSamples) -> NodeRecording:
         movement=None if movement is None else np.nan_to_num(movement[:, 0]) > 0.0,
         position_m=on_grid.get(POSITION),
         start_s=origin_s + grid.start_s,
+        assumed=unit.assumed,
     )
 
 

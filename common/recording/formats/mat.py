@@ -75,7 +75,8 @@ def read_mat(path: Path, options: ReadOptions) -> ReadFile:
             f"{path}: none of its arrays {', '.join(variables)} is a sensor's by its name; give them, as "
             "--columns acc=NAME --columns gyr=NAME"
         )
-    return ReadFile((UnitSamples(path.stem, series, rate),), tuple(notes))
+    assumed = frozenset(quantity for quantity in series if quantity not in options.units)
+    return ReadFile((UnitSamples(path.stem, series, rate, assumed=assumed),), tuple(notes))
 
 
 def _variables(path: Path) -> Variables:

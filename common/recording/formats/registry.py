@@ -122,7 +122,8 @@ def _joined(path: Path, unit: UnitSamples, known: tuple[Path, UnitSamples] | Non
             f"{path}: {unit.name}: its {', '.join(sorted(twice))} is in {known[0]} too; give one of the two "
             "nodes another name (--name OLD=NEW)"
         )
-    return replace(known[1], series={**known[1].series, **unit.series})
+    assumed = known[1].assumed | unit.assumed
+    return replace(known[1], series={**known[1].series, **unit.series}, assumed=assumed)
 
 
 def _check_name(path: Path, name: str) -> None:

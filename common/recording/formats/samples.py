@@ -35,6 +35,8 @@ class UnitSamples:
     """Of series without stamps."""
     counts: bool = False
     """True: raw counts of a converter, of which the unit is not known."""
+    assumed: frozenset[str] = frozenset()
+    """Quantities of which the file tells no unit, taken as SI."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,8 @@ from master.calibrate.unit_evidence import rest_gravity
 _NEAR = 0.1
 _SHORTEST_S = 2.0
 _LONGEST_BRIDGED_S = 0.25
+_FASTEST_RAD_S = 70.0
+"""Wearable gyroscopes end at 2000 or 4000 °/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,8 @@ def judge(node: NodeRecording) -> ImportJudgement:
         return ImportJudgement(words="raw counts: units are not judged")
     run = longest_run(node)
     if run is None or run.duration_s < _SHORTEST_S:
-        return ImportJudgement(words=f"units and axes not judged: less than {_SHORTEST_S:g} s of acc and gyr")
+        why = f"less than {_SHORTEST_S:g} s of acc and gyr"
+        return ImportJudgement(_undecided(node, why), words=f"units and axes not judged: {why}")
     gravity = rest_gravity(run.acc_m_s2, run.gyr_rad_s)
     refused = _gravity(node.name, gravity)
     if refused:
@@ -45,7 +48,8 @@ def judge(node: NodeRecording) -> ImportJudgement:
     agreement = gyro_gravity(run.acc_m_s2, run.gyr_rad_s, run.rate_hz)
     checks = judge_agreement(agreement)
     if checks[0].verdict == "not judged":
-        return ImportJudgement("", gravity, f"gyroscope's unit and axes not judged: {checks[0].advice}")
+        why = checks[0].advice
+        return ImportJudgement(_undecided(node, why), gravity, f"gyroscope's unit and axes not judged: {why}")
     of_unit, of_axes, of_both = checks
     if of_unit.contradicts:
         unit = _gyro_unit(agreement.best if agreement else np.eye(3))
@@ -69,6 +73,23 @@ def _gravity(name: str, gravity: float) -> str:
         if abs(gravity * factor / G_M_S2 - 1.0) < _NEAR:
             return f"{reads}: these are {unit}; give --units {ACC}={unit}"
     return f"{reads}: another unit or raw counts; give --units {ACC}=UNIT, or calibrate it first"
+
+
+def _undecided(node: NodeRecording, why: str) -> str:
+    """Why a gyroscope's numbers cannot be used whose unit neither the file nor the motion tells."""
+    there = np.isfinite(node.gyr_rad_s)
+    if GYR not in node.assumed or not there.any():
+        return ""
+    peak = float(np.abs(node.gyr_rad_s[there]).max())
+    if peak > _FASTEST_RAD_S:
+        return (
+            f"{node.name}: its gyroscope reads up to {peak:.4g} and the file tells no unit; expected at most "
+            f"{_FASTEST_RAD_S:g} {SI[GYR]}: give --units {GYR}=deg/s, or the unit that it is"
+        )
+    return (
+        f"{node.name}: the file tells no unit of its gyroscope, and the recording does not show it ({why}); "
+        f"give --units {GYR}=rad/s or {GYR}=deg/s"
+    )
 
 
 def _gyro_unit(best: Array) -> str:

@@ -110,6 +110,35 @@ def test_units_and_axes_that_cannot_be_are_refused_in_a_line(
     assert out.exists()
 
 
+@pytest.mark.parametrize(
+    ("gyr", "message"),
+    [
+        (0.01 * S.gyr[:800], r"tells no unit of its gyroscope, .* give --units gyr=rad/s or gyr=deg/s"),
+        (
+            S.gyr[:800] * 200.0 / np.abs(S.gyr[:800]).max(),
+            r"reads up to 200 .* at most 70 rad/s: give --units",
+        ),
+    ],
+    ids=["either", "degrees by their size"],
+)
+def test_a_unit_that_neither_the_file_nor_the_motion_tells_is_asked_for(
+    tmp_path: Path, gyr: Array, message: str
+) -> None:
+    """8 s are too short to hold the gyroscope's turns against gravity's."""
+    out = tmp_path / "out.npz"
+    rows = np.column_stack([S.time_s[:800], np.tile([0.0, 0.0, G], (800, 1)), gyr])
+    path = table(tmp_path / "left.csv", NAMES, rows)
+    with pytest.raises(TandemError, match=message):
+        run(path, "--out", out)
+    assert not out.exists()
+    assert "not judged" in run(path, "--out", out, "--units", "gyr=deg/s")
+    with np.load(out) as arrays:
+        np.testing.assert_allclose(arrays["gyr"], np.radians(gyr), rtol=1e-6, atol=1e-6)
+    named = table(tmp_path / "named.csv", NAMES.replace("gyr_x", "gyr_x_dps").replace("gyr_y", "gyr_y_dps")
+                  .replace("gyr_z", "gyr_z_dps"), rows)  # fmt: skip
+    assert "not judged" in run(named, "--out", tmp_path / "named.npz")
+
+
 def test_g_and_degrees_when_told_so(tmp_path: Path) -> None:
     path, out = csv(tmp_path, S.acc / G, np.degrees(S.gyr)), tmp_path / "out.npz"
     tree = json.loads(run(path, "--out", out, "--units", "acc=g,gyr=deg/s", "--json"))
