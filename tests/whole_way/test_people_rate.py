@@ -61,6 +61,7 @@ def run(network: str, command_hz: str) -> Found:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("network", "period_ms", "most_rmse"), [("lan", 20, 0.92), ("4g", 40, 0.88)])
 def test_people_are_followed_nearer_at_the_rate_that_the_line_bears(
