@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -12,6 +12,9 @@ from rich.console import Console
 from common.errors import TandemError
 from deploy.ops.convert.joints import AngleSource
 from deploy.report.output import in_a_folder
+
+if TYPE_CHECKING:
+    from common.skeleton import Skeleton
 
 
 class ExportFormat(StrEnum):
@@ -91,34 +94,48 @@ def export_joints(
 
     Example: `tandem export morning.mcap --to bvh --of encoders --out morning.bvh`
     """
+    from deploy.recorded.profile import recorded_skeleton
+
+    path = _named(file, to, out)
+    skeleton = recorded_skeleton([file], profile)
+    if to is ExportFormat.SHARE:
+        said = _share(file, out, key, skeleton)
+    elif to in WHOLE:
+        from deploy.ops.convert.whole import WholeOptions, write_whole
+
+        said = write_whole(to.value, WholeOptions(file, path, skeleton, rate, task, subject, session))
+    else:
+        said = _joints(file, path, to, of, skeleton=skeleton, rate=rate)
+    Console().print(f"{path}: {said}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _named(file: Path, to: ExportFormat, out: Path | None) -> Path:
+    """Where to write. Raises TandemError for a name with another format's ending."""
+    usual = file.with_name(file.stem + ENDINGS.get(to, f".{to}"))
+    path = out or usual
+    if usual.suffix and path.suffix.lower() != usual.suffix:
+        raise TandemError(f"--out {path}: expected a name that ends in {usual.suffix}")
+    return path
+
+
+def _share(file: Path, out: Path | None, key: Path | None, skeleton: Skeleton) -> str:
+    from deploy.ops.convert.share import ShareKey, write_share
+
+    if key is None:
+        raise TandemError("export --to share: name the secret's file by --key, outside of what you share")
+    if out is None:  # a recording's name holds its date
+        raise TandemError("export --to share: name the copy by --out, without date and name")
+    return write_share(file, out, skeleton, ShareKey(key))
+
+
+def _joints(
+    file: Path, path: Path, to: ExportFormat, of: AngleSource, *, skeleton: Skeleton, rate: float | None
+) -> str:
+    """Write the angles of one source; what was written, after what a person should know of it."""
     from deploy.ops.convert.bvh import write_bvh
     from deploy.ops.convert.joint_files import write_bag, write_csv, write_mot
     from deploy.ops.convert.joints import read_joints
-    from deploy.recorded.profile import recorded_skeleton
 
-    path = out or file.with_name(file.stem + ENDINGS.get(to, f".{to}"))
-    ending = file.with_name(file.stem + ENDINGS.get(to, f".{to}")).suffix
-    if ending and path.suffix.lower() != ending:
-        raise TandemError(f"--out {path}: expected a name that ends in {ending}")
-    skeleton = recorded_skeleton([file], profile)
-    if to is ExportFormat.SHARE:
-        from deploy.ops.convert.share import ShareKey, write_share
-
-        if key is None:
-            raise TandemError("export --to share: name the secret's file by --key, outside of what you share")
-        if out is None:  # a recording's name holds its date
-            raise TandemError("export --to share: name the copy by --out, without date and name")
-        said = write_share(file, path, skeleton, ShareKey(key))
-        Console().print(f"{path}: {said}", highlight=False, markup=False, soft_wrap=True)
-        return
-    if to in WHOLE:
-        from deploy.ops.convert.whole import WholeOptions, write_whole
-
-        options = WholeOptions(file, path, skeleton, rate, task, subject, session)
-        Console().print(
-            f"{path}: {write_whole(to.value, options)}", highlight=False, markup=False, soft_wrap=True
-        )
-        return
     series = read_joints(file, skeleton, of)
     if to is ExportFormat.CSV:
         note = write_csv(path, series)
@@ -128,9 +145,7 @@ def export_joints(
         note = write_bvh(path, series, skeleton, rate or round(series.rate_hz, 3))
     else:
         note = write_bag(path, series, mcap=to is ExportFormat.MCAP)
-    console = Console()
     for one in (*series.notes, note):
         if one:
-            console.print(one, style="yellow", highlight=False, markup=False)
-    rows = f"{len(series.time_ns)} rows of {len(series.names)} joints, {series.time_s[-1]:.1f} s"
-    console.print(f"{path}: {rows} ({of})", highlight=False, markup=False, soft_wrap=True)
+            Console().print(one, style="yellow", highlight=False, markup=False)
+    return f"{len(series.time_ns)} rows of {len(series.names)} joints, {series.time_s[-1]:.1f} s ({of})"

@@ -18,6 +18,24 @@ from deploy.report.output import in_a_folder, metrics_writer
 if TYPE_CHECKING:
     from deploy.ops.record.record import RecordOptions
 
+TapSocket = Annotated[
+    Path | None,
+    typer.Option(
+        help="Record at a process of this host instead: the path of its `[tap] socket`. It holds what "
+        "the sensors said, so that `tandem replay` can compute it again.",
+    ),
+]
+MinutesPerFile = Annotated[
+    float,
+    typer.Option(
+        help="Begin a new file (FILE-2.mcap, …) after this many minutes; 0: keep one file.", min=0.0
+    ),
+]
+SessionFolder = Annotated[
+    Path | None,
+    typer.Option(help="With --tap: the folder of a session (`tandem session start`).", file_okay=False),
+]
+
 
 def record(
     out: Annotated[
@@ -31,27 +49,13 @@ def record(
         ),
     ] = None,
     robot: Annotated[str | None, typer.Option(help="Name of the robot.")] = None,
-    tap: Annotated[
-        Path | None,
-        typer.Option(
-            help="Record at a process of this host instead: the path of its `[tap] socket`. It holds what "
-            "the sensors said, so that `tandem replay` can compute it again.",
-        ),
-    ] = None,
+    tap: TapSocket = None,
     connect: ConnectTo = None,
     link: LinkFile = None,
     video: Cameras = None,
-    minutes_per_file: Annotated[
-        float,
-        typer.Option(
-            help="Begin a new file (FILE-2.mcap, …) after this many minutes; 0: keep one file.", min=0.0
-        ),
-    ] = 60.0,
+    minutes_per_file: MinutesPerFile = 60.0,
     seconds: StopAfter = None,
-    session: Annotated[
-        Path | None,
-        typer.Option(help="With --tap: the folder of a session (`tandem session start`).", file_okay=False),
-    ] = None,
+    session: SessionFolder = None,
     may_miss: Annotated[
         bool, typer.Option("--may-miss", help="End with status 0 even if numbered messages are missing.")
     ] = False,

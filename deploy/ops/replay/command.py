@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -21,7 +21,7 @@ from common.wire.version import software
 from deploy.ops.replay.comparison import ReplayFindings, compare
 from deploy.ops.replay.played import PlayedMotion, motion_of
 from deploy.recorded.files import begun_ns, entries_of, head_of, snapshot_ns
-from deploy.recorded.recompute import Replay
+from deploy.recorded.recompute import Recomputed, Replay
 from deploy.recorded.recorded_config import recorded_config
 from deploy.report.options import AsJson, Overrides
 from deploy.report.tables import plain_table
@@ -77,36 +77,48 @@ def replay(
     Example: `tandem replay morning.mcap --check`
     """
     changes = [*(overrides or ()), *([f'estimation.filter="{filter_name}"'] if filter_name else ())]
-    with ExitStack() as kept:
-        metadata = head_of(files[0])
-        if config is not None:
-            used = load_config(config, MasterConfig, changes)
+    with _computed(files, config, changes, from_s) as (run, pairs):
+        if robot is not None:
+            motion = motion_of(pair.computed for pair in pairs)
         else:
-            used = kept.enter_context(recorded_config(metadata, files[0].name, changes))
-        other = config is not None or bool(changes)
-        run = Replay(used, from_snapshots=not other)
-        with Console(stderr=True).status("computing"):
-            begin_ns = begun_ns(files[0]) + to_ns(from_s)
-            pairs = run.pairs(entries_of(files, snapshot_ns(files, begin_ns)))
-            wanted = (pair for pair in pairs if pair.recorded.sampled_ns >= begin_ns)
-            if robot is not None:
-                motion = motion_of(pair.computed for pair in wanted)
-            else:
-                result = compare(run, wanted)
+            result = compare(run, pairs)
     if robot is not None:
         _play(motion, robot, speed, as_json=as_json)
         return
+    _show(result, files[0], other=config is not None or bool(changes), as_json=as_json)
+    if check and not result.whole:
+        raise TandemError(f"{files[0]}: {result.postures - result.identical} postures differ")
+
+
+@contextmanager
+def _computed(
+    files: Sequence[Path], config: Path | None, changes: Sequence[str], from_s: float
+) -> Iterator[tuple[Replay, Iterator[Recomputed]]]:
+    """The computation, and its postures beside the recorded ones, while the recorded files are at hand."""
+    with ExitStack() as kept:
+        if config is not None:
+            used = load_config(config, MasterConfig, changes)
+        else:
+            used = kept.enter_context(recorded_config(head_of(files[0]), files[0].name, changes))
+        run = Replay(used, from_snapshots=config is None and not changes)
+        kept.enter_context(Console(stderr=True).status("computing"))
+        begin_ns = begun_ns(files[0]) + to_ns(from_s)
+        pairs = run.pairs(entries_of(files, snapshot_ns(files, begin_ns)))
+        yield run, (pair for pair in pairs if pair.recorded.sampled_ns >= begin_ns)
+
+
+def _show(result: ReplayFindings, file: Path, *, other: bool, as_json: bool) -> None:
+    """Print it. Raises TandemError where nothing was computed."""
     if not result.postures:
         raise TandemError(
-            f"{files[0]}: nothing could be computed: {result.skipped} postures are recorded, and no snapshot "
+            f"{file}: nothing could be computed: {result.skipped} postures are recorded, and no snapshot "
             "stands before them; was it recorded by --tap, and for longer than a moment?"
         )
+    metadata = head_of(file)
     if as_json:
         typer.echo(json.dumps({**asdict(result), **_versions(metadata), "other": other}, indent=2))
     else:
         _print(result, metadata)
-    if check and not result.whole:
-        raise TandemError(f"{files[0]}: {result.postures - result.identical} postures differ")
 
 
 def _versions(metadata: Mapping[str, str]) -> dict[str, str]:
