@@ -10,6 +10,7 @@ def test_the_core_of_a_robots_host_needs_no_package_without_wheels_for_aarch64()
     assert {"numpy", "mujoco", "eclipse-zenoh", "uvloop", "canopen", "rosbags"} <= wanted
     assert wanted & {"vqf", "hdrhistogram", "evdev"} == set()
     assert "vqf>=2.1" in requirements("x86_64", "3.11")
+    assert "vqf>=2.1" not in requirements("x86_64", "3.14"), "vqf ends at Python 3.13"
 
 
 def test_what_is_built_on_the_host_is_an_extra() -> None:

@@ -48,7 +48,7 @@ def orient(recordings: Mapping[str, NodeRecording], names: Sequence[str]) -> Ori
 
     Short gaps are bridged. Raises PoorMotionError for long ones, and for a recording of a moment.
     """
-    from vqf import offlineVQF  # no wheels for aarch64: only who calibrates needs it
+    from vqf import offlineVQF  # no wheels for aarch64 nor Python 3.14: only who calibrates needs it
 
     rates = {recordings[name].rate_hz for name in names}
     if max(rates) - min(rates) > 0.01 * max(rates):

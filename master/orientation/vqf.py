@@ -50,7 +50,7 @@ class VqfFilter(BehindFront):
     """
 
     def __init__(self, config: VqfConfig, rate_hz: float, count: int) -> None:
-        """Raises ModuleNotFoundError without the package, which has no wheels for aarch64."""
+        """Raises ModuleNotFoundError without the package, which has no wheels for aarch64 nor Python 3.14."""
         from vqf import VQF
 
         self._period_s = 1.0 / rate_hz
