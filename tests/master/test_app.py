@@ -36,6 +36,7 @@ class FakeLink:
 
 class FakeSession:
     paths = ""
+    overheard = None
 
     def link(self, _: str) -> FakeLink:
         return FakeLink()

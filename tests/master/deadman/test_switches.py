@@ -54,6 +54,7 @@ class Link:
 
 class Session:
     paths = ""
+    overheard = None
 
     def __init__(self) -> None:
         self.links = {name: Link() for name in ROBOTS}
