@@ -10,6 +10,9 @@ from common.config.section import Section
 from common.errors import ConfigMistake
 from common.skeleton import Skeleton
 
+JUDGED_HZ = 200.0
+"""The loop for which `effort_late_s` stands, and in which all thresholds were judged."""
+
 
 class Reflex(StrEnum):
     """What follows the protective stop."""
@@ -57,6 +60,15 @@ class ContactConfig(Section):
     `drive_hz` behind their setpoints. With less than the true one the robot follows more softly."""
     joints: dict[str, ContactJoint] = Field(default_factory=dict)
     """Single joints, by name. Fingers are watched only where they are named: they are meant to touch."""
+
+    def at(self, loop_hz: float) -> ContactConfig:
+        """The same for a loop that reads the drives so often.
+
+        Between two readings a torque is known as if it changed evenly. What a setpoint's kink does to it in a
+        longer gap is not seen, and feigned a push every few seconds at 100 Hz (README.md).
+        """
+        slower = max(1.0, JUDGED_HZ / loop_hz)
+        return self.model_copy(update={"effort_late_s": self.effort_late_s * slower**2})
 
     def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
         """Joints that the robot does not have."""

@@ -211,6 +211,7 @@ def test_the_video_has_a_frame_for_each_row_at_a_constant_rate(dataset: Path) ->
     assert abs(frames[0].to_ndarray(format="rgb24").mean() - 96.0) < 4.0
 
 
+@pytest.mark.filterwarnings("ignore")  # its packages warn of each other
 def test_lerobot_itself_opens_it(dataset: Path) -> None:
     # not among tandem's extras: with torch and its CUDA libraries it is more than 1.6 GB
     lerobot = pytest.importorskip("lerobot.datasets.lerobot_dataset")
