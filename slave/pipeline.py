@@ -81,7 +81,7 @@ class SlavePipeline:
             draw_token=draw_token,
         )
         self.control = Control(config.guard.reset_key, operators_of(config.link.access, config.robot))
-        contact = config.contact.at(config.loop.rate_hz)
+        contact = config.contact.for_loop(config.loop.rate_hz)
         self.contact = ContactWatch(self.skeleton, contact, config.servos.payload)
         self.zone_forces = ZoneForces(self.skeleton, config.guard.zones)
         self.motion = RobotMotion(config, self.contact, tracker)

@@ -61,11 +61,11 @@ class ContactConfig(Section):
     joints: dict[str, ContactJoint] = Field(default_factory=dict)
     """Single joints, by name. Fingers are watched only where they are named: they are meant to touch."""
 
-    def at(self, loop_hz: float) -> ContactConfig:
+    def for_loop(self, loop_hz: float) -> ContactConfig:
         """The same for a loop that reads the drives so often.
 
-        Between two readings a torque is known as if it changed evenly. What a setpoint's kink does to it in a
-        longer gap is not seen, and feigned a push every few seconds at 100 Hz (README.md).
+        Between two readings a torque is known as if it changed evenly. In a longer gap it does not, and where
+        readings came a cycle of the drives late besides, that feigned pushes at 100 Hz (README.md).
         """
         slower = max(1.0, JUDGED_HZ / loop_hz)
         return self.model_copy(update={"effort_late_s": self.effort_late_s * slower**2})

@@ -114,6 +114,9 @@ class VirtualWorld:
         self._under_way: list[tuple[int, int, Callable[[], None]]] = []
         self._order = itertools.count()
         self._tick = 0
+        loop_ns = NS_PER_S / self.slave_config.loop.rate_hz
+        self._drive_every = max(1, round(loop_ns / PERIOD_NS))
+        """Ticks to one turn of the slave's loop: 200, 100, 67, 50 … a second."""
 
     @property
     def simulated(self) -> SimulatedRobot:
@@ -194,7 +197,8 @@ class VirtualWorld:
     def _step(self) -> None:
         begin_ns = self.now_ns
         self._at(begin_ns, self._capture)
-        self._at(begin_ns + SLAVE_PHASE_NS, self._drive)
+        if (self._tick + 1) % self._drive_every == 0:
+            self._at(begin_ns + SLAVE_PHASE_NS, self._drive)
         if self._tick % 4 == 0:
             self._at(begin_ns + NODE_NS, self._send_buttons)
         if self._tick % 50 == 0:
@@ -288,7 +292,7 @@ class VirtualWorld:
             self._robot.limit_torque(setpoint.torque_nm)
             self._robot.write(self.inject.write(setpoint.position_rad))
             self.slave.written(now_ns)
-        if self._tick % self.slave_config.loop.state_every == 0:
+        if self._tick % (self._drive_every * self.slave_config.loop.state_every) == 0:
             self._carry(Traffic.STATE, self.slave.state(now_ns), self._on_state)
 
     def _on_state(self, payload: bytes) -> None:
