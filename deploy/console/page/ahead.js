@@ -24,10 +24,13 @@ export function tubes(links, placed, tube_rad) {
   });
 }
 
-/** Where the robot is seen and where it is by now, of a view: { now, will, more_m }; null where it is not foretold. */
+/**
+ * Where the robot is seen and where it is by now, of a view: { now, will, more_m }; null where it is not foretold, or
+ * where an encoder is not valid: the camera itself may stand elsewhere then.
+ */
 export function foretold(view, links) {
-  if (!view.ahead || view.heard === "none") return null;
-  const now = view.encoder.map((angle) => angle ?? 0);
+  const now = view.encoder;
+  if (!view.ahead || view.heard === "none" || now.includes(null)) return null;
   const will = now.map((angle, j) => view.ahead.position[j] ?? angle);
   return { now, will, more_m: tubes(links, placeLinks(links, will), view.ahead.tube) };
 }

@@ -50,6 +50,11 @@ def test_it_is_drawn_over_a_camera_that_is_known_and_goes_with_what_tells_it(
     until(page, lambda: page.evaluate(DRAWN) == 0.0)
     fake.view = {"ahead": foretold(fake)}
     until(page, lambda: page.evaluate(DRAWN) > 0.01)
+    # an encoder that is not valid: nobody knows where the head, and so the camera, stands
+    fake.view = {"ahead": foretold(fake), "encoder": [None, *fake.posture(0.0)[1:]]}
+    until(page, lambda: page.evaluate(DRAWN) == 0.0)
+    fake.view = {"ahead": foretold(fake)}
+    until(page, lambda: page.evaluate(DRAWN) > 0.01)
     fake.pictures = False
     until(page, lambda: bool(page.evaluate("document.querySelector('.camera.stale')")))
     until(page, lambda: page.evaluate(DRAWN) == 0.0)
