@@ -34,6 +34,20 @@ _LEAD = (
     "hang on the suit's bus, which is the most exact, or on one at the robot."
 )
 
+PollFile = Annotated[
+    Path | None,
+    typer.Option(
+        help="At the robot: poll the node on a bus there, never the drives', until Ctrl-C; TOML file with "
+        "[bus].",
+        exists=True,
+        dir_okay=False,
+    ),
+]
+ProofRecording = Annotated[
+    Path,
+    typer.Option(help="With --lead or --poll: the recording to write.", dir_okay=False, callback=in_a_folder),
+]
+
 
 def prove_motion(
     files: Annotated[
@@ -60,21 +74,8 @@ def prove_motion(
         Path | None,
         typer.Option(help="Instead of a recording: be led through one, at the master's `[tap] socket`."),
     ] = None,
-    poll: Annotated[
-        Path | None,
-        typer.Option(
-            help="At the robot: poll the node on a bus there, never the drives', until Ctrl-C; TOML file "
-            "with [bus].",
-            exists=True,
-            dir_okay=False,
-        ),
-    ] = None,
-    out: Annotated[
-        Path,
-        typer.Option(
-            help="With --lead or --poll: the recording to write.", dir_okay=False, callback=in_a_folder
-        ),
-    ] = Path("proof.mcap"),
+    poll: PollFile = None,
+    out: ProofRecording = Path("proof.mcap"),
     seconds: Annotated[
         float, typer.Option(help="How long the hand moves, with --lead or --simulate.", min=14.0)
     ] = 28.0,
@@ -110,7 +111,7 @@ def prove_motion(
     elif files:
         rows = _of_recording(files, hand, node, node_recording)
     else:
-        raise TandemError(f"expected a recording, --lead SOCKET, or --simulate lan. {_LEAD}")
+        raise TandemError(f"expected a recording, --lead SOCKET, --poll FILE, or --simulate lan. {_LEAD}")
     if as_json:
         typer.echo(json.dumps([asdict(row) for row in rows], indent=2))
     else:
