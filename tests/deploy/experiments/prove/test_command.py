@@ -16,5 +16,7 @@ def test_what_may_be_planted() -> None:
 
 
 def test_without_a_recording_it_says_what_to_do() -> None:
-    with pytest.raises(TandemError, match="expected a recording, --lead SOCKET, --poll FILE, or --simulate lan"):
+    with pytest.raises(
+        TandemError, match="expected a recording, --lead SOCKET, --poll FILE, or --simulate lan"
+    ):
         prove_motion()
